@@ -93,7 +93,7 @@ elf=$target/avr-none/firmware/weeder-firmware.elf
 # The tester's firmware.
 "$weeder" hex --tester "$folder/weeder-tester.hex"
 
-# What the host tools have inside: the firmware of each chip with its budgets, and the Uno's bootloader for the virtual Uno.
+# What the host tools have inside: the firmware of each chip with its budgets, the Uno's bootloader for the virtual Uno, and the page.
 cargo bench-firmware --locked
 cargo tester-firmware --locked
 inside=$target/release-inside
@@ -116,9 +116,11 @@ cmp "$inside/weeder.hex" "$folder/weeder.hex"
 [ -d page/node_modules ] || npm --prefix page ci --no-audit --no-fund
 WEEDER="$weeder" npm --prefix page run build
 cp -r page/dist "$folder/page"
+cp -r page/dist "$inside/page"
 
-# The host tools of the release.
-export WEEDER_PAGE="$folder/page" WEEDER_FIRMWARE="$inside"
+# The host tools of the release. They name their commit by themselves.
+unset WEEDER_COMMIT
+export WEEDER_INSIDE="$inside"
 if [ "$system" = "$here" ]; then
     cargo build --locked --release --package weeder-cli
     cp "$target/release/weeder" "$folder/"
@@ -128,7 +130,7 @@ else
     build_for_another
     cp "$target/$system/release/weeder$exe" "$folder/"
 fi
-unset WEEDER_PAGE WEEDER_FIRMWARE
+unset WEEDER_INSIDE
 
 # The front door, with the part for this system. On Linux, the rule.
 if [ -n "$exe" ]; then

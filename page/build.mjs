@@ -10,10 +10,10 @@
 import { execFileSync } from "node:child_process";
 import { createHash } from "node:crypto";
 import { existsSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
-import { basename, extname, join, resolve } from "node:path";
+import { basename, join, resolve } from "node:path";
 import { fileURLToPath } from "node:url";
 import { deflateRawSync } from "node:zlib";
-import { build } from "esbuild";
+import { build, transform } from "esbuild";
 
 const here = fileURLToPath(new URL(".", import.meta.url));
 process.chdir(here);
@@ -68,25 +68,18 @@ function faults() {
     return resolve("build/faults.json");
 }
 
-/** Replaces the names behind `$` in the page's HTML by the English texts. */
-async function english() {
-    const { outputFiles } = await build({ entryPoints: ["src/words/en.ts"], format: "esm", write: false });
-    const { en } = await import(`data:text/javascript,${encodeURIComponent(outputFiles[0]?.text ?? "")}`);
-    const text = (/** @type {string} */ name) => {
-        const text = en.words[name];
-        if (text === undefined) throw new Error(`src/index.html names the text ${name}, which src/words/en.ts has not`);
-        return text;
-    };
-    return {
-        name: "english",
-        setup(/** @type {import("esbuild").PluginBuild} */ { onLoad }) {
-            onLoad({ filter: /\.html$/ }, ({ path }) => ({
-                contents: readFileSync(path, "utf8").replaceAll(/\$(\w+)/g, (_, name) => text(name)),
-                loader: /** @type {const} */ ("copy"),
-            }));
-        },
-    };
+/** The page's HTML, with the English texts instead of their names behind `$`. */
+async function html() {
+    const { code } = await transform(readFileSync("src/words/en.ts"), { loader: "ts" });
+    const { words } = await import(`data:text/javascript,${encodeURIComponent(code)}`);
+    return readFileSync("src/index.html", "utf8").replaceAll(/\$(\w+)/g, (_, name) => {
+        if (words[name] === undefined) throw new Error(`src/words/en.ts lacks the text ${name} of src/index.html`);
+        return words[name];
+    });
 }
+
+/** The SHA-256 of a text. */
+const hashOf = (/** @type {string} */ text) => createHash("sha256").update(text).digest("hex");
 
 /** The files that an installed page has, and their media types. */
 const MEDIA = {
@@ -125,38 +118,27 @@ await build({ ...forNode, entryPoints: ["src/uno/lockstep.ts"], outfile: "build/
 const what = process.argv[2];
 if (what === "page") {
     rmSync("dist", { recursive: true, force: true });
+    mkdirSync("dist");
     /** @type {import("esbuild").BuildOptions} */
-    const page = {
-        ...common,
-        outdir: "dist",
-        entryNames: "[name]",
-        format: "iife",
-        loader: { ...common.loader, ".html": "copy", ".svg": "copy", ".webmanifest": "copy" },
-        minify: true,
-        plugins: [await english()],
-    };
-    const entryPoints = [
-        { in: "src/start.ts", out: "page" },
-        ...["src/page.css", "src/index.html", "src/app/manifest.webmanifest", "src/app/icon.svg"].map((path) => ({
-            in: path,
-            out: basename(path, extname(path)),
-        })),
-    ];
+    const page = { ...common, outdir: "dist", entryNames: "[name]", format: "iife", minify: true };
+    const { outputFiles = [] } = await build({
+        ...page,
+        entryPoints: ["src/start.ts", "src/page.css"].map((path) => ({ in: path, out: "page" })),
+        define: { BUILD: '"{BUILD}"' },
+        write: false,
+    });
+    const built = Object.fromEntries(outputFiles.map(({ path, text }) => [basename(path), text]));
+    for (const name of ["manifest.webmanifest", "icon.svg"]) built[name] = readFileSync(join("src/app", name), "utf8");
+    built["index.html"] = await html();
     // The build's name is the hash of the files without it.
-    const { outputFiles } = await build({ ...page, entryPoints, write: false });
-    const hash = createHash("sha256");
-    for (const { path, contents } of outputFiles.sort((one, other) => (one.path < other.path ? -1 : 1)))
-        hash.update(basename(path)).update(contents);
-    const name = hash.digest("hex").slice(0, 16);
-    await build({ ...page, entryPoints, define: { BUILD: JSON.stringify(name) } });
-    const html = readFileSync("dist/index.html", "utf8").replaceAll("?BUILD", `?${name}`);
-    writeFileSync("dist/index.html", html);
+    const name = hashOf(Object.entries(built).sort().join()).slice(0, 16);
     // What the worker stores: by its address, the hash of its content, and its media type.
     const files = Object.entries(MEDIA).map(([file, media]) => {
-        const content = readFileSync(join("dist", file));
+        const content = (built[file] ?? "").replaceAll("{BUILD}", name);
+        writeFileSync(join("dist", file), content);
         const address =
             { "index.html": "./", "page.css": `page.css?${name}`, "page.js": `page.js?${name}` }[file] ?? file;
-        return [address, { hash: createHash("sha256").update(content).digest("hex"), media }];
+        return [address, { hash: hashOf(content), media }];
     });
     const define = { BUILD: JSON.stringify(name), FILES: JSON.stringify(Object.fromEntries(files)) };
     await build({ ...page, entryPoints: ["src/app/worker.ts"], define });

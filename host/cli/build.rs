@@ -1,21 +1,54 @@
-//! Sets the version of `weeder`: the package's version and the commit of the build.
+//! Sets the version of `weeder`: the package's version and the commit of the build. Puts a release's files inside.
 //!
-//! The commit comes from the environment variable `WEEDER_COMMIT`, or else from the clone that contains this folder,
-//! with a `+` if files of the clone have changed since. Without both, the version has no commit.
+//! The commit is that of the clone that contains this folder, with a `+` if files of the clone have changed since.
+//! Outside of a clone, the version has no commit.
+//!
+//! The environment variable `WEEDER_INSIDE` names the folder of the files. release.sh sets it; other builds contain none.
+//! The other crates do not depend on it, so a release compiles this one only.
 
-use std::env;
 use std::path::Path;
 use std::process::Command;
+use std::{env, fs};
+
+/// The firmware of each chip, its budgets and the bootloader, by the names that `uno_run::firmware` expects.
+const FIRMWARE: [&str; 6] = [
+    "weeder-firmware.elf",
+    "knn-bench.elf",
+    "tester-firmware.elf",
+    "budgets.toml",
+    "yard/tester/budgets.toml",
+    "optiboot.hex",
+];
+
+/// The page, in the order that `serve::Page` expects.
+const PAGE: [&str; 3] = ["page/index.html", "page/page.css", "page/page.js"];
 
 /// Length of a commit's name.
 const DIGITS: &str = "--short=7";
 
 fn main() {
-    println!("cargo::rerun-if-env-changed=WEEDER_COMMIT");
-    let commit = env::var("WEEDER_COMMIT").ok().or_else(commit_of_the_clone).filter(|commit| !commit.is_empty());
     let version = env::var("CARGO_PKG_VERSION").expect("cargo names the package's version");
-    let commit = commit.map(|commit| format!(" ({commit})")).unwrap_or_default();
+    let commit = commit_of_the_clone().map(|commit| format!(" ({commit})")).unwrap_or_default();
     println!("cargo::rustc-env=WEEDER_VERSION={version}{commit}");
+
+    println!("cargo::rerun-if-env-changed=WEEDER_INSIDE");
+    let files = env::var("WEEDER_INSIDE").ok().map(|folder| {
+        let include = |name: &&str| {
+            let path = Path::new(&folder).join(name);
+            println!("cargo::rerun-if-changed={}", path.display());
+            format!("include_bytes!({path:?})")
+        };
+        let firmware = FIRMWARE.iter().map(|name| format!("({name:?}, {})", include(name)));
+        let page = PAGE.iter().map(include);
+        format!(
+            "Some(Inside {{ firmware: &[{}], page: [{}] }})",
+            firmware.collect::<Vec<_>>().join(", "),
+            page.collect::<Vec<_>>().join(", ")
+        )
+    });
+    let out = env::var("OUT_DIR").expect("cargo names it");
+    fs::write(Path::new(&out).join("inside.rs"), files.as_deref().unwrap_or("None"))
+        .expect("cargo has made the folder");
 }
 
 fn commit_of_the_clone() -> Option<String> {

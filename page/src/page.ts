@@ -80,13 +80,13 @@ tryPanel.onHappening = (happening) => {
     if (happening.is !== settleAt) return;
     settleAt = undefined;
     const asked = [...simulation.machine.setUp, "save", "clear"].map((command) => tryPanel.ask(command));
-    void Promise.all(asked).then(startWork, () => {});
+    // Then the work switch is thrown, so that the first machine weeds at once.
+    const start = () => {
+        workSwitch.checked = true;
+        simulation.work(true);
+    };
+    void Promise.all(asked).then(start, () => {});
 };
-/** Throws the work switch, so that the first machine weeds at once. */
-function startWork(): void {
-    workSwitch.checked = true;
-    simulation.work(true);
-}
 /** The event to wait for before the settings are saved. */
 let settleAt: "connected" | undefined;
 

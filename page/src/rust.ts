@@ -8,28 +8,23 @@ interface Exports {
     readonly answer: () => number;
     readonly length: () => number;
     readonly read: () => void;
-    readonly table: (number: number) => number;
-    /** Rolls the machine until a cycle. */
-    readonly roll: (cycle: number) => void;
-    /** Passes a pulse to the machine's servo, by the cycles of its edges. */
-    readonly hear: (rise: number, fall: number) => void;
 }
 
 const [encoder, decoder] = [new TextEncoder(), new TextDecoder()];
 
 export class Rust {
-    readonly exports: Exports;
+    readonly #exports: Exports;
 
     /** `progress` takes how far a long answer is, from 0 to 1. */
     constructor(module: WebAssembly.Module, progress: (share: number) => void = () => {}) {
         const { exports } = new WebAssembly.Instance(module, { page: { progress_is: progress } });
-        this.exports = exports as unknown as Exports;
+        this.#exports = exports as unknown as Exports;
     }
 
     /** Asks a question. Throws if it is invalid: the page and its Rust are then of different versions. */
     ask<Answer>(question: unknown): Answer {
         this.#put(encoder.encode(JSON.stringify(question)));
-        const { memory, answer, length } = this.exports;
+        const { memory, answer, length } = this.#exports;
         const at = answer();
         const text = decoder.decode(new Uint8Array(memory.buffer, at, length()));
         const said = JSON.parse(text) as { answer: Answer } | { error: string };
@@ -40,19 +35,12 @@ export class Rust {
     /** Passes the next bytes of a log. */
     read(bytes: Uint8Array): void {
         this.#put(bytes);
-        this.exports.read();
-    }
-
-    /** A table of the log's picture or of the rolling machine, valid until the next call. */
-    table(number: number): Float64Array<ArrayBuffer> {
-        const { memory, table, length } = this.exports;
-        const at = table(number);
-        return new Float64Array(memory.buffer as ArrayBuffer, at, length());
+        this.#exports.read();
     }
 
     #put(bytes: Uint8Array): void {
-        const room = this.exports.room(bytes.length);
+        const room = this.#exports.room(bytes.length);
         // The memory may move when it grows.
-        new Uint8Array(this.exports.memory.buffer, room, bytes.length).set(bytes);
+        new Uint8Array(this.#exports.memory.buffer, room, bytes.length).set(bytes);
     }
 }

@@ -7,36 +7,19 @@ import { chosen, keep } from "./preferences.ts";
 
 export type Signal = "alarm" | "lost" | "held";
 
-/** Tones one after the other, in Hz and ms, with the same pause after each; and the vibration, on and off in ms. */
+/** Tones one after the other, with the same pause after each; and the vibration, on and off in ms. */
 interface Sound {
-    readonly tones: readonly (readonly [hz: number, ms: number])[];
+    /** The tones' frequencies, and how long each lasts. */
+    readonly hz: readonly number[];
+    readonly ms: readonly number[];
     readonly pauseMs: number;
     readonly vibration: readonly number[];
 }
 
 const SOUNDS: Readonly<Record<Signal, Sound>> = {
-    alarm: {
-        tones: [1, 2, 3, 4].map(() => [1760, 180] as const),
-        pauseMs: 90,
-        vibration: [300, 100, 300, 100, 300],
-    },
-    lost: {
-        tones: [
-            [660, 350],
-            [440, 350],
-            [330, 500],
-        ],
-        pauseMs: 30,
-        vibration: [1000],
-    },
-    held: {
-        tones: [
-            [660, 110],
-            [990, 160],
-        ],
-        pauseMs: 20,
-        vibration: [80, 60, 80],
-    },
+    alarm: { hz: Array(4).fill(1760), ms: Array(4).fill(180), pauseMs: 90, vibration: [300, 100, 300, 100, 300] },
+    lost: { hz: [660, 440, 330], ms: [350, 350, 500], pauseMs: 30, vibration: [1000] },
+    held: { hz: [660, 990], ms: [110, 160], pauseMs: 20, vibration: [80, 60, 80] },
 };
 /** Time in which the same signal is given only once: several machines may obey together. */
 const ONCE_MS = 300;
@@ -77,20 +60,21 @@ export function signal(which: Signal): void {
     const nowMs = performance.now();
     if (!isOn() || nowMs - (lastMs[which] ?? Number.NEGATIVE_INFINITY) < ONCE_MS) return;
     lastMs[which] = nowMs;
-    const { tones, pauseMs, vibration } = SOUNDS[which];
+    const { hz, ms, pauseMs, vibration } = SOUNDS[which];
     // An untouched page may not vibrate, and the browser logs an error.
     if (navigator.userActivation?.hasBeenActive !== false) navigator.vibrate?.([...vibration]);
     if (!context) return;
     let atS = Math.max(context.currentTime, busyUntilS);
-    for (const [hz, ms] of tones) {
+    for (const [number, frequency] of hz.entries()) {
+        const lengthMs = ms[number] ?? 0;
         const [tone, volume] = [context.createOscillator(), context.createGain()];
         tone.type = "square";
-        tone.frequency.value = hz;
+        tone.frequency.value = frequency;
         volume.gain.value = GAIN;
         tone.connect(volume).connect(context.destination);
         tone.start(atS);
-        tone.stop(atS + ms / 1000);
-        atS += (ms + pauseMs) / 1000;
+        tone.stop(atS + lengthMs / 1000);
+        atS += (lengthMs + pauseMs) / 1000;
     }
     busyUntilS = atS;
 }

@@ -4,7 +4,7 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 import { hex } from "../src/core.ts";
-import { isEvent, read } from "../src/link/grammar.ts";
+import { read } from "../src/link/grammar.ts";
 import { inWords } from "../src/try/outcome.ts";
 import { Simulation } from "../src/try/simulation.ts";
 
@@ -25,7 +25,7 @@ class Tried {
             for (const line of lines) {
                 const said = read(line);
                 if (said.is === "status") this.simulation.take({ is: "status", status: said, line });
-                else if (isEvent(said)) this.simulation.take({ is: "event", event: said, line });
+                else if ("isEvent" in said) this.simulation.take({ is: "event", event: said, line });
             }
         };
         this.pass(0.5);

@@ -8,7 +8,7 @@ import faults from "faults.json";
 import type { Browser, Page } from "playwright-core";
 import { ask, module } from "../src/core.ts";
 import { Rust } from "../src/rust.ts";
-import { en } from "../src/words/en.ts";
+import * as en from "../src/words/en.ts";
 import { type Code, LANGUAGES, type Language, speak, told } from "../src/words/words.ts";
 import { assertOnScreen } from "./boxes.ts";
 import { close, inspect, launch, type Opened, open } from "./browser.ts";
@@ -51,7 +51,7 @@ assert(helps.length >= 23);
 
 for (const code of OTHERS)
     test(`no text is missing in ${LANGUAGES[code].name}, or left in English`, () => {
-        const { words, heard, advice, settings, steps }: Language = LANGUAGES[code].table;
+        const { words, heard, advice = {}, settings = {}, steps = {} }: Language = LANGUAGES[code];
         const texts: (readonly [name: string, english: string, text: string])[] = [
             ...Object.entries(en.words).map(([name, text]) => [name, text, words[name as keyof typeof words]] as const),
             ...Object.entries(en.heard).map(([name, text]) => [name, text, heard[name as keyof typeof heard]] as const),
@@ -61,8 +61,8 @@ for (const code of OTHERS)
         for (const { title, how } of ask<{ steps: { title: string; how: string }[] }>({
             setUp: { lines: [], settings: {} },
         }).steps) {
-            const [ownTitle, ownHow] = steps[title] ?? ["", ""];
-            texts.push([title, title, ownTitle], [`how: ${title}`, how, ownHow]);
+            const [ownTitle = "", ...ownHow] = (steps[title] ?? "").split(". ");
+            texts.push([title, title, ownTitle], [`how: ${title}`, how, ownHow.join(". ")]);
         }
         for (const [name, english, text] of texts) {
             assert(text.trim() === text && text !== "", `${name} is missing`);
@@ -256,7 +256,7 @@ for (const code of Object.keys(LANGUAGES) as Code[])
     test(`in ${LANGUAGES[code].name} no text is too long for its place on a small phone, and state, reason and HOLD are on its screen`, async () => {
         const opened = await tryIt(browser, SMALL);
         const { page } = opened;
-        const table: Language = LANGUAGES[code].table;
+        const table: Language = LANGUAGES[code];
         await page.locator("#language").selectOption(code);
         assert.equal(await page.locator("html").getAttribute("lang"), code);
         assert.equal(await page.locator("#unchecked").textContent(), table.words.unchecked);
@@ -275,7 +275,7 @@ for (const code of Object.keys(LANGUAGES) as Code[])
             .filter({ hasText: table.words.alarm.replace("{title}", "2-1 encoder_silent") })
             .waitFor();
         const advice =
-            table.advice.encoder_silent ?? faults.find(({ name }) => name === "encoder_silent")?.advice ?? "";
+            table.advice?.encoder_silent ?? faults.find(({ name }) => name === "encoder_silent")?.advice ?? "";
         await part(page, "alarm-advice")
             .filter({ hasText: advice.slice(1) })
             .waitFor();
@@ -332,10 +332,10 @@ test("another language leaves the machine connected, and what was said before is
     await part(page, "settings-said").filter({ hasText: en.words.areMachines }).waitFor();
     const connected = await page.evaluate(() => globalThis.simulation.uno.cycle);
     await page.locator("#language").selectOption("fr");
-    const { words } = LANGUAGES.fr.table;
+    const { words } = LANGUAGES.fr;
     await part(page, "settings-said").filter({ hasText: words.areMachines }).waitFor();
     await part(page, "settings-list")
-        .filter({ hasText: LANGUAGES.fr.table.heard.range.split("{")[2]?.slice(-8) ?? "" })
+        .filter({ hasText: LANGUAGES.fr.heard.range.split("{")[2]?.slice(-8) ?? "" })
         .waitFor();
     await part(page, "state").filter({ hasText: words.hold }).waitFor();
     assert((await page.evaluate(() => globalThis.simulation.uno.cycle)) > connected);

@@ -30,12 +30,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let bench_elf = firmware::BENCH.elf()?;
     let elf = firmware::build()?;
     let classifier = with_bar("classifying", |show| bench::classifier(&bench_elf, show))?;
-    let rates = with_bar("turning the encoder", |show| {
-        let all = encoder::Turning::all();
-        let count = all.len() as f64;
-        let rate = |(done, turning)| encoder::highest_rate(&elf, turning, |share| show((done as f64 + share) / count));
-        all.enumerate().map(rate).collect::<Result<Vec<_>>>()
-    })?;
+    let rates = with_bar("turning the encoder", |show| encoder::highest_rates(&elf, show))?;
     let jitter = with_bar("watching the servo", |show| servo::jitter(&elf, show))?;
     let lateness = with_bar("swinging", |show| swings::lateness(&elf, &swings::Rows::at_walking_speed(0..ROWS), show))?;
     let figures = Figures { classifier, size: Size::read(&elf)?, rates, jitter, lateness };

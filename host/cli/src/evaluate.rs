@@ -10,7 +10,7 @@ use logbook::worked::worked;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use study::evaluation::field_log::{self, OfLog};
-use study::evaluation::{self, Analysis, ResponseAnalysis};
+use study::evaluation::{self, Analysis, PlotRecord, ResponseAnalysis};
 use study::page::Page;
 
 /// The report's name in its folder.
@@ -109,8 +109,8 @@ fn write_report(
 
 /// The whole analysis. Without a model, `no_model` says why.
 fn in_json(analysis: &Analysis) -> Value {
-    let plots = analysis.records.iter().zip(&analysis.performances);
-    let plots: Vec<Value> = plots.map(|(record, result)| json!({ "record": record, "performance": result })).collect();
+    let plot = |record: &PlotRecord| json!({ "record": record, "performance": record.performance() });
+    let plots: Vec<Value> = analysis.records.iter().map(plot).collect();
     let responses: Vec<Value> = analysis.responses.iter().map(response_in_json).collect();
     json!({
         "findings": analysis.findings(),

@@ -19,6 +19,7 @@ mod figures;
 mod flash;
 mod hex;
 mod input;
+mod inside;
 mod map;
 mod merge;
 mod monitor;
@@ -43,9 +44,11 @@ use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
 use frame::program::Finding;
 use frame::{course, destination, numbers, output, program, progress, row, source};
+use inside::INSIDE;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use uno_run::firmware;
 
 /// Tries the intra-row weeder's firmware on a simulated field, and puts it on an Arduino Uno.
 #[derive(Parser)]
@@ -163,6 +166,9 @@ fn run(command: Command) -> Result<Finding> {
 }
 
 fn main() -> ExitCode {
+    if let Some(inside) = INSIDE {
+        firmware::put_inside(inside.firmware);
+    }
     program::main(|arguments: Arguments| run(arguments.command))
 }
 

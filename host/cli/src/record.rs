@@ -12,7 +12,7 @@ use link::advice;
 use link::rows::{Rows, What};
 use link::session::Happening;
 use link::settings::other_version;
-use logbook::log::{LogError, LogWriter};
+use logbook::log::{Kind, LogError, LogWriter};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -62,8 +62,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             let said = gps.turn(time_ms, Instant::now());
             let written = logs.lines_at(gps.row, time_ms, &said);
             logs.go_on_after(written, gps.row, &chosen)?;
-            for (_, line) in said.iter().filter(|(kind, _)| kind.is_for_the_operator()) {
-                tell!("Receiver: {line}");
+            for (kind, line) in &said {
+                if let Kind::GpsFound | Kind::GpsLost | Kind::GpsMark = kind {
+                    tell!("Receiver: {line}");
+                }
             }
         }
         let Some(heard) = rows.next(LOOK) else { continue };
@@ -157,7 +159,7 @@ impl Logs {
     /// # Errors
     /// At the first failure of a log.
     pub fn write(&mut self, row: usize, happening: &Happening) -> Result<(), LogError> {
-        self.logs[row].write(|writer| writer.write(happening))
+        self.logs[row].write(|writer| writer.write(writer.now_ms(), happening))
     }
 
     /// The time of a row's line written now, in milliseconds.

@@ -1,6 +1,7 @@
 //! `weeder serve`: the page, from the computer that has the serial port to a phone.
 
 use crate::ctrl_c;
+use crate::inside::INSIDE;
 use crate::numbers::whole_within;
 use crate::output::{say, tell};
 use crate::ports::Ports;
@@ -55,9 +56,9 @@ pub struct Arguments {
 
 /// Serves until Ctrl-C.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let page = match (&arguments.page, Page::inside()) {
+    let page = match (&arguments.page, INSIDE) {
         (Some(folder), _) => Page::read(folder)?,
-        (None, Some(inside)) => inside,
+        (None, Some(inside)) => Page::of(inside.page),
         (None, None) => Page::read(&firmware::workspace_root().join("page/dist"))?,
     };
     let lan = match arguments.lan {

@@ -226,14 +226,14 @@ fn differences(wanted: &Named, found: &Shown) -> Result<Vec<Difference>, Setting
         let own = found.others.iter().find(|other| other.name == name(setting)).map(|other| Value::from(other.value));
         let machine = match found.missing.contains(&setting) {
             true => own.unwrap_or(Value::Null),
-            false => value(setting, found.settings.get(setting)),
+            false => value(setting.is_switched(), found.settings.get(setting)),
         };
-        differences.push((name(setting), value(setting, file), machine, unit(setting)));
+        differences.push((name(setting), value(setting.is_switched(), file), machine, unit(setting)));
     }
     for foreign in &wanted.foreign {
         let own = found.takes(foreign)?;
-        let value = |number: u16| if own.is_switched { Value::from(number != 0) } else { Value::from(number) };
-        differences.push((own.name.clone(), value(foreign.value), value(own.value), own.unit.clone()));
+        let [file, machine] = [foreign.value, own.value].map(|number| value(own.is_switched, number));
+        differences.push((own.name.clone(), file, machine, own.unit.clone()));
     }
     differences.retain(|(_, file, machine, _)| file != machine);
     Ok(differences)
@@ -250,14 +250,12 @@ fn table(differences: &[Difference]) -> Table {
 
 fn as_json(shown: &Shown) -> Value {
     let known = Setting::all().filter(|setting| !shown.missing.contains(setting));
-    let known = known.map(|setting| (name(setting), value(setting, shown.settings.get(setting))));
-    let others = shown.others.iter().map(|other| {
-        (other.name.clone(), if other.is_switched { Value::from(other.value != 0) } else { Value::from(other.value) })
-    });
+    let known = known.map(|setting| (name(setting), value(setting.is_switched(), shown.settings.get(setting))));
+    let others = shown.others.iter().map(|other| (other.name.clone(), value(other.is_switched, other.value)));
     known.chain(others).collect()
 }
 
 /// A setting's value in JSON, as in the file.
-fn value(setting: Setting, number: u16) -> Value {
-    settings_file::is_true(setting, number).map_or_else(|| Value::from(number), Value::from)
+fn value(is_switched: bool, number: u16) -> Value {
+    if is_switched { Value::from(number != 0) } else { Value::from(number) }
 }

@@ -101,7 +101,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
 fn write_part(study: &Study, elf: Option<&Path>, part: Part) -> Result<Finding> {
     let hours = u64::from(study.hours);
     let all = hours + u64::from(study.uno_minutes);
-    let numbers = part.shard.numbers(all);
+    let numbers: Vec<u64> = part.shard.numbers(all).collect();
     let count = numbers.len() as f64;
     let tallies = with_bar("soaking", |show| {
         let tally = |(number, begun)| {
@@ -113,7 +113,7 @@ fn write_part(study: &Study, elf: Option<&Path>, part: Part) -> Result<Finding> 
             show(1.0);
             Ok(Numbered { number, outcome })
         };
-        numbers.zip(0..).map(tally).collect::<Result<Vec<_>>>()
+        numbers.into_iter().zip(0..).map(tally).collect::<Result<Vec<_>>>()
     })?;
     part.write(COMMAND, all, study, tallies)?;
     Ok(Finding::Good)

@@ -136,8 +136,8 @@ impl ConsoleLine {
         if let Some(error) = line.strip_prefix("error:") {
             return Self::End { error: Some(error.trim().to_owned()) };
         }
-        let event = EventLine::parse(line).map(Self::Event);
-        event
+        EventLine::parse(line)
+            .map(Self::Event)
             .or_else(|| Status::parse(line).map(Self::Status))
             .or_else(|| Counts::parse(line).map(Self::Counts))
             .or_else(|| version(line))
@@ -160,9 +160,8 @@ fn greeting(line: &str) -> Option<ConsoleLine> {
 
 /// Parses `weeder VERSION`. A version may be followed by its commit.
 fn version(line: &str) -> Option<ConsoleLine> {
-    line.strip_prefix(NAME)
-        .filter(|version| is_version(version))
-        .map(|version| ConsoleLine::Version { version: version.to_owned() })
+    let version = line.strip_prefix(NAME)?.to_owned();
+    is_version(&version).then_some(ConsoleLine::Version { version })
 }
 
 /// `field|built_in NUMBER LABEL FEATURES`.
@@ -197,13 +196,12 @@ fn setting(line: &str) -> Option<ConsoleLine> {
     let mut words = rest.split(' ');
     let value = self::value(words.next()?)?;
     let words: Vec<&str> = words.collect();
-    let (unit, least, greatest) = match words.as_slice() {
-        ["on", "or", "off"] => ("", "0", "1"),
-        ["from", least, "to", greatest] => ("", *least, *greatest),
-        [unit, "from", least, "to", greatest] => (*unit, *least, *greatest),
+    let (unit, least, greatest) = match words[..] {
+        ["on", "or", "off"] => ("", 0, 1),
+        ["from", least, "to", greatest] => ("", least.parse().ok()?, greatest.parse().ok()?),
+        [unit, "from", least, "to", greatest] => (unit, least.parse().ok()?, greatest.parse().ok()?),
         _ => return None,
     };
-    let (least, greatest) = (least.parse().ok()?, greatest.parse().ok()?);
     let default = self::value(parts.next()?.strip_prefix("default ")?)?;
     let saved = match parts.next() {
         None => Some(value),
@@ -227,7 +225,7 @@ fn is_of_a_name(character: char) -> bool {
     character.is_ascii_alphanumeric() || character == '_'
 }
 
-fn is_name(word: &str) -> bool {
+pub(crate) fn is_name(word: &str) -> bool {
     !word.is_empty() && word.chars().all(is_of_a_name)
 }
 
@@ -250,6 +248,7 @@ mod tests {
     use control::memory::Volatile;
     use knn::Example;
     use rig::Rig;
+    use std::assert_matches;
 
     const DONE: ConsoleLine = ConsoleLine::End { error: None };
 
@@ -326,32 +325,22 @@ mod tests {
     #[test]
     fn every_line_of_the_firmwares_answers_is_read() {
         let table = Setting::all().map(|setting| {
-            let description = setting.description();
-            ConsoleLine::Setting {
-                name: settings::name(setting),
-                value: description.default,
-                unit: settings::unit(setting),
-                least: description.least,
-                greatest: description.greatest,
-                is_switched: setting.is_switched(),
-                default: description.default,
-                saved: None,
-            }
+            let (name, unit, is_switched) = (settings::name(setting), settings::unit(setting), setting.is_switched());
+            let (least, greatest, default) = (setting.least(), setting.greatest(), setting.default());
+            ConsoleLine::Setting { name, value: default, unit, least, greatest, is_switched, default, saved: None }
         });
         assert_eq!(answer("get"), table.chain([DONE]).collect::<Vec<_>>());
-        assert!(matches!(answer("version").as_slice(), [ConsoleLine::Version { .. }, DONE]));
-        assert!(matches!(answer("status").as_slice(), [ConsoleLine::Status(_), ConsoleLine::Counts(_), DONE]));
-        assert!(matches!(answer("nothing").as_slice(), [ConsoleLine::End { error: Some(_) }]));
+        assert_matches!(&answer("version")[..], [ConsoleLine::Version { .. }, DONE]);
+        assert_matches!(&answer("status")[..], [ConsoleLine::Status(_), ConsoleLine::Counts(_), DONE]);
+        assert_matches!(&answer("nothing")[..], [ConsoleLine::End { error: Some(_) }]);
         let examples = answer("examples");
         let [first, second, .., end] = examples.as_slice() else { panic!("{examples:?}") };
-        assert!(matches!(first, ConsoleLine::Example { from_field: false, label: Class::Plant, .. }), "{first:?}");
-        assert!(matches!(second, ConsoleLine::Example { from_field: false, label: Class::Weed, .. }), "{second:?}");
+        assert_matches!(first, ConsoleLine::Example { from_field: false, label: Class::Plant, .. });
+        assert_matches!(second, ConsoleLine::Example { from_field: false, label: Class::Weed, .. });
         assert_eq!(end, &DONE);
         let help = answer("help");
-        assert!(
-            help.len() > 15 && help[..help.len() - 1].iter().all(|said| matches!(said, ConsoleLine::Help { .. })),
-            "{help:?}"
-        );
+        assert!(help.len() > 15);
+        help[..help.len() - 1].iter().for_each(|said| assert_matches!(said, ConsoleLine::Help { .. }));
         for setting in Setting::all() {
             let (name, help) = (settings::name(setting), settings::help(setting));
             let said = answer(&format!("help {name}"));

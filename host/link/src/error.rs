@@ -87,7 +87,6 @@ fn others(ports: &[String]) -> String {
     if ports.is_empty() { String::new() } else { format!(" (there is {})", ports.join(", ")) }
 }
 
-/// What to do if there is no Uno.
 fn remedy(without_port: &[&str]) -> String {
     const OF_THE_SYSTEM: &str = if cfg!(target_os = "linux") {
         "on Linux, brltty may have taken it: remove that program with `sudo apt remove brltty`, then plug it in again"

@@ -10,6 +10,7 @@ mod values;
 pub use self::field::{Field, Fields};
 pub use self::values::Values;
 use self::values::behind;
+use crate::console_line::is_name;
 use control::alarm::{Alarm, Warning};
 use control::ground::class::Class;
 use control::operate::calibration::{Outcome, SwingTimes};
@@ -244,8 +245,6 @@ impl Mode {
 
 /// Whether a line has the form of an event: its name, then a value with its key. No line of an answer has.
 fn is_event(line: &str) -> bool {
-    let is_name =
-        |word: &str| !word.is_empty() && word.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
     let is_value = |word: &str| word.split_once('=').is_some_and(|(key, value)| is_name(key) && !value.is_empty());
     let mut words = line.split(' ');
     line.bytes().all(|byte| matches!(byte, b' '..=b'~'))
@@ -276,7 +275,7 @@ mod tests {
     use control::say::line::Line;
     use control::say::write_event;
     use control::units::{Instant, Position, Ticks};
-    use rand::{RngExt, SeedableRng};
+    use rand::{RngExt, SeedableRng, seq::IteratorRandom};
     use rand_chacha::ChaCha8Rng;
     use rig::{Beams, ByExamples, Rig};
     use std::collections::{BTreeMap, BTreeSet};
@@ -293,8 +292,7 @@ mod tests {
     /// Any event.
     fn any(chance: &mut ChaCha8Rng) -> Event {
         let position = Position::new(chance.random());
-        let alarms: Vec<Alarm> = (0..).map_while(Alarm::from_index).collect();
-        let alarm = alarms[chance.random_range(0..alarms.len())];
+        let alarm = (0..).map_while(Alarm::from_index).choose(chance).expect("there are alarms");
         match chance.random_range(0..9) {
             0 | 1 => {
                 let class = [Class::Plant, Class::Weed, Class::Unknown][chance.random_range(0..3)];
@@ -307,10 +305,7 @@ mod tests {
             4 => Event::Swing { out: chance.random(), position },
             5 => Event::State([State::Hold, State::Work, State::Alarm(alarm)][chance.random_range(0..3)]),
             6 => Event::Alarm { alarm, position },
-            7 => {
-                let warnings: Vec<Warning> = (0..).map_while(Warning::from_index).collect();
-                Event::Warning(warnings[chance.random_range(0..warnings.len())])
-            }
+            7 => Event::Warning((0..).map_while(Warning::from_index).choose(chance).expect("there are warnings")),
             _ => {
                 let times = SwingTimes { out_ms: chance.random(), in_ms: chance.random() };
                 let outcomes = [Outcome::Measured(times), Outcome::Shown, Outcome::Failed];
@@ -389,11 +384,10 @@ mod tests {
     fn every_status_is_read_as_the_firmware_writes_it() {
         let mut chance = ChaCha8Rng::seed_from_u64(28);
         let mut met = BTreeSet::new();
-        let causes: Vec<Cause> = (0..).map_while(Cause::from_index).collect();
         for _ in 0..100 {
-            let cause = causes[chance.random_range(0..causes.len())];
-            let (classifier, readings) =
-                (Nearest::new(&EXAMPLES[..], Volatile::new()), Readings::new(Instant::ZERO, Position::new(0)));
+            let cause = (0..).map_while(Cause::from_index).choose(&mut chance).expect("there are causes");
+            let classifier = Nearest::new(&EXAMPLES[..], Volatile::new());
+            let readings = Readings::new(Instant::ZERO, Position::new(0));
             let mut rig =
                 Rig::wake_from(classifier, Volatile::new(), readings, Beams::default(), cause, chance.random());
             for _ in 0..50 {
@@ -460,12 +454,11 @@ mod tests {
             mode: Mode::Alarm,
             alarm: Some(Alarm::BeamBlocked),
             tool_out: true,
-            reason: None,
             position: -5,
             speed_mm_s: -3,
             zones: 2,
             unseen_mm: 400,
-            slip_permille: None,
+            ..Status::default()
         };
         // In the present format, and in that of version 0.1.
         for alarm in ["code=1-1 name=beam_blocked", "alarm=beam_blocked"] {

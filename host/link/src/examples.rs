@@ -102,7 +102,8 @@ pub fn taught(line: &str) -> Option<(bool, u16, Taught)> {
 /// errors of the link.
 pub fn push(link: &mut Link, wanted: &[Taught], replace: bool) -> Result<Pushed, ExamplesError> {
     let before = read(link)?;
-    let (mut known, named) = (set(before.iter().map(|(_, example)| example)), set(wanted));
+    let mut known: HashSet<Taught> = before.iter().map(|&(_, example)| example).collect();
+    let named: HashSet<Taught> = wanted.iter().copied().collect();
     let stale: Vec<u16> =
         before.iter().filter(|(_, example)| replace && !named.contains(example)).map(|&(number, _)| number).collect();
     let new: Vec<&Taught> = wanted.iter().filter(|&&example| known.insert(example)).collect();
@@ -122,8 +123,7 @@ pub fn push(link: &mut Link, wanted: &[Taught], replace: bool) -> Result<Pushed,
         teach(link, example).or_else(|_| teach(link, example))?;
     }
     let after = read(link)?;
-    let after = set(after.iter().map(|(_, example)| example));
-    let missing = named.difference(&after).count();
+    let missing = named.iter().filter(|&&wanted| after.iter().all(|&(_, example)| example != wanted)).count();
     if missing > 0 {
         return Err(ExamplesError::NotTaken(missing));
     }
@@ -139,10 +139,6 @@ pub fn lines(example: &Taught) -> impl Iterator<Item = String> + use<> {
     let label = if example.label == label::PLANT { "plant" } else { "weed" };
     let features = example.features.map(|feature| format!("teach {feature}"));
     features.into_iter().chain([format!("teach {label}")])
-}
-
-fn set<'a>(examples: impl IntoIterator<Item = &'a Taught>) -> HashSet<Taught> {
-    examples.into_iter().copied().collect()
 }
 
 /// Converts a detection to an example, as the firmware's `label` does.

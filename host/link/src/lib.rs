@@ -64,13 +64,6 @@ const SILENT_READS: u128 = session::FIRST_PATIENCE.as_millis() / SILENT_READ.as_
 /// Silent reads until the greeting must come after a reset.
 const BOOT_READS: u128 = session::BOOT.as_millis() / SILENT_READ.as_millis();
 
-/// Something from the port.
-enum Received {
-    Line(String),
-    Bytes(usize),
-    Nothing,
-}
-
 /// A link to the firmware's console.
 pub struct Link {
     wire: Wire,
@@ -130,17 +123,11 @@ impl Link {
         let (mut silent_reads, mut bytes) = (0, 0);
         let mut answer: Vec<String> = Vec::new();
         while silent_reads < SILENT_READS && bytes < session::ANSWER_BYTES && Instant::now() < deadline {
-            let line = match self.hear()? {
-                Received::Nothing => {
-                    silent_reads += 1;
-                    continue;
-                }
-                Received::Bytes(count) => {
-                    bytes += count;
-                    silent_reads = 0;
-                    continue;
-                }
-                Received::Line(line) => line,
+            let Some(line) = self.lines.next_line() else {
+                let received = self.receive()?;
+                silent_reads = if received == 0 { silent_reads + 1 } else { 0 };
+                bytes += received;
+                continue;
             };
             match ConsoleLine::parse(&line) {
                 ConsoleLine::End { error: None } => return Ok(answer),
@@ -164,7 +151,7 @@ impl Link {
         if !is_command(command) {
             return Err(LinkError::NoCommand(command.to_owned()));
         }
-        self.type_line(command)
+        self.wire.write(format!("{command}\n").as_bytes())
     }
 
     /// The next line that the machine says; none where no line was complete within a fiftieth of a second.
@@ -172,15 +159,11 @@ impl Link {
     /// # Errors
     /// If the port is gone.
     pub fn next_line(&mut self) -> Result<Option<String>, LinkError> {
-        if let Some(line) = self.events.pop_front() {
-            return Ok(Some(line));
+        let buffered = self.events.pop_front().or_else(|| self.lines.next_line());
+        if buffered.is_none() {
+            self.receive()?;
         }
-        match self.hear()? {
-            Received::Line(line) => Ok(Some(line)),
-            // The line that these bytes complete is there at once.
-            Received::Bytes(_) => Ok(self.lines.next_line()),
-            Received::Nothing => Ok(None),
-        }
+        Ok(buffered.or_else(|| self.lines.next_line()))
     }
 
     /// Waits for the greeting of a firmware that starts. Returns whether it has come.
@@ -189,7 +172,8 @@ impl Link {
     /// If the port is gone.
     pub fn greeting(&mut self) -> Result<bool, LinkError> {
         for _ in 0..BOOT_READS {
-            if self.next_line()?.is_some_and(|line| is_greeting(&line)) {
+            let line = self.next_line()?.unwrap_or_default();
+            if let ConsoleLine::Greeting { .. } = ConsoleLine::parse(&line) {
                 return Ok(true);
             }
         }
@@ -198,24 +182,14 @@ impl Link {
 
     /// Closes the port, so that it can be opened again. The link behaves as if the port were gone.
     pub fn close(&mut self) {
-        self.wire.close();
+        self.wire = Wire::over(std::io::empty(), false);
     }
 
-    fn type_line(&mut self, line: &str) -> Result<(), LinkError> {
-        self.wire.write(format!("{line}\n").as_bytes())
-    }
-
-    /// Returns a buffered line, or reads one.
-    fn hear(&mut self) -> Result<Received, LinkError> {
-        if let Some(line) = self.lines.next_line() {
-            return Ok(Received::Line(line));
-        }
+    /// Reads from the port. Returns the number of bytes.
+    fn receive(&mut self) -> Result<usize, LinkError> {
         let bytes = self.wire.read()?;
-        if bytes.is_empty() {
-            return Ok(Received::Nothing);
-        }
         self.lines.take(&bytes);
-        Ok(Received::Bytes(bytes.len()))
+        Ok(bytes.len())
     }
 }
 
@@ -235,11 +209,6 @@ pub fn command(line: &str) -> Result<Command, ParseError> {
 /// Whether a line means `hold`: in any case, with any punctuation at its end. An operator in a hurry types it.
 pub fn is_hold(line: &str) -> bool {
     line.trim().trim_end_matches(|last: char| last.is_ascii_punctuation()).trim_end().eq_ignore_ascii_case("hold")
-}
-
-/// Whether a line is the firmware's greeting after a start.
-pub fn is_greeting(line: &str) -> bool {
-    matches!(ConsoleLine::parse(line), ConsoleLine::Greeting { .. })
 }
 
 #[cfg(test)]

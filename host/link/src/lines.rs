@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 /// Replaces a byte that is no printable character.
 pub(super) const STRANGE: char = '\u{FFFD}';
 
-/// The longest line in characters. The firmware's own lines are shorter than 128.
+/// The longest line in bytes. The firmware's own lines are shorter than 128.
 const LIMIT: usize = 256;
 
 /// Most lines that wait to be taken. A further line drops the oldest.
@@ -18,7 +18,6 @@ const WAITING: usize = 1024;
 #[derive(Clone, Debug, Default)]
 pub struct LineReader {
     partial: String,
-    length: usize,
     complete: VecDeque<String>,
 }
 
@@ -47,14 +46,12 @@ impl LineReader {
 
     fn push(&mut self, character: char) {
         self.partial.push(character);
-        self.length += 1;
-        if self.length == LIMIT {
+        if self.partial.len() >= LIMIT {
             self.end();
         }
     }
 
     fn end(&mut self) {
-        self.length = 0;
         let line = std::mem::take(&mut self.partial);
         if line.is_empty() {
             return;

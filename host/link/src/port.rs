@@ -18,7 +18,8 @@ const BAUD: u32 = 115_200;
 /// Longest wait of a read for a byte, and of a write for room.
 const PATIENCE: Duration = Duration::from_millis(20);
 
-/// USB vendors and products of the Uno.
+/// The name of the Uno, and its USB vendors and products.
+const UNO: &str = "Uno";
 const UNOS: [(u16, u16); 5] =
     [(0x2341, 0x0001), (0x2341, 0x0043), (0x2341, 0x0243), (0x2A03, 0x0043), (0x2A03, 0x0243)];
 
@@ -71,11 +72,12 @@ pub(super) fn calling_out(port: &str) -> String {
 /// Whether two names lead to the same port.
 #[must_use]
 pub fn is_same(one: &str, other: &str) -> bool {
-    let resolved = |port: &str| {
-        let path = std::fs::canonicalize(port).map_or_else(|_| port.to_owned(), |path| path.display().to_string());
-        calling_out(&path)
-    };
-    resolved(one) == resolved(other)
+    calling_out(&resolved(one)) == calling_out(&resolved(other))
+}
+
+/// The path of a port that a link may lead to.
+fn resolved(port: &str) -> String {
+    std::fs::canonicalize(port).map_or_else(|_| port.to_owned(), |path| path.display().to_string())
 }
 
 /// The only Uno's port among those of this machine. A device at the port `beside` is none.
@@ -93,20 +95,21 @@ fn only_uno(
     on_the_bus: impl FnOnce() -> Vec<(u16, u16)>,
 ) -> Result<String, LinkError> {
     let free = || ports.iter().filter(|port| beside.is_none_or(|beside| !is_same(&port.port_name, beside)));
-    let unos: Vec<&SerialPortInfo> =
-        free().filter(|port| number(port).is_some_and(|number| UNOS.contains(&number))).collect();
-    let found = if unos.is_empty() { free().filter(|port| is_uno(port)).collect() } else { unos };
+    let unos: Vec<&SerialPortInfo> = free().filter(|port| name_at(port) == Some(UNO)).collect();
+    let found = if unos.is_empty() { free().filter(|port| name_at(port).is_some()).collect() } else { unos };
     match found.as_slice() {
         [only] => Ok(only.port_name.clone()),
         [] => Err(LinkError::NoUno {
             ports: free().map(|port| port.port_name.clone()).collect(),
             without_port: without_port(&on_the_bus(), ports),
         }),
-        several => Err(LinkError::SeveralUnos(several.iter().map(|port| named(port)).collect())),
+        several => {
+            let named = |port: &&SerialPortInfo| format!("{} ({})", port.port_name, name_at(port).unwrap_or_default());
+            Err(LinkError::SeveralUnos(several.iter().map(named).collect()))
+        }
     }
 }
 
-/// The USB vendor and product of the device at a port.
 fn number(port: &SerialPortInfo) -> Option<(u16, u16)> {
     match &port.port_type {
         SerialPortType::UsbPort(UsbPortInfo { vid, pid, .. }) => Some((*vid, *pid)),
@@ -114,15 +117,15 @@ fn number(port: &SerialPortInfo) -> Option<(u16, u16)> {
     }
 }
 
-/// Whether the port belongs to an Uno or a compatible board, by its USB vendor and product.
-pub(super) fn is_uno(port: &SerialPortInfo) -> bool {
-    number(port).is_some_and(|number| name(number).is_some())
-}
-
 /// The name of an Uno or a converter.
 fn name(number: (u16, u16)) -> Option<&'static str> {
     let converter = || CONVERTERS.iter().find(|(known, _)| *known == number).map(|(_, name)| *name);
-    if UNOS.contains(&number) { Some("Uno") } else { converter() }
+    if UNOS.contains(&number) { Some(UNO) } else { converter() }
+}
+
+/// The name of the Uno or the converter at a port. `None` if another device is there.
+pub(super) fn name_at(port: &SerialPortInfo) -> Option<&'static str> {
+    number(port).and_then(name)
 }
 
 /// The converter at a port, if it is one that devices other than an Uno have too.
@@ -130,15 +133,9 @@ fn name(number: (u16, u16)) -> Option<&'static str> {
 pub fn converter_at(port: &str) -> Option<&'static str> {
     let ports = listed().ok()?;
     let port = ports.iter().find(|listed| is_same(&listed.port_name, port))?;
-    number(port).and_then(name).filter(|name| *name != "Uno")
+    name_at(port).filter(|name| *name != UNO)
 }
 
-fn named(port: &SerialPortInfo) -> String {
-    let name = number(port).and_then(name);
-    name.map_or_else(|| port.port_name.clone(), |name| format!("{} ({name})", port.port_name))
-}
-
-/// The USB vendors and products of all devices.
 fn on_the_bus() -> Vec<(u16, u16)> {
     // Without the list, the message does not name devices without a port.
     let devices = nusb::list_devices().wait().into_iter().flatten();
@@ -207,8 +204,7 @@ pub fn claim(name: &str) -> Result<Claim, LinkError> {
 
 /// The file that is locked while a port is claimed. It stays, because another program may be about to lock it.
 fn lock_of(name: &str) -> PathBuf {
-    let port = std::fs::canonicalize(name).map_or_else(|_| name.to_owned(), |path| path.display().to_string());
-    let port: String = port.chars().map(|part| if part.is_ascii_alphanumeric() { part } else { '-' }).collect();
+    let port = resolved(name).replace(|part: char| !part.is_ascii_alphanumeric(), "-");
     std::env::temp_dir().join(format!("weeder{port}.lock"))
 }
 
@@ -244,7 +240,6 @@ pub fn listen(name: &str, baud: u32) -> Result<Box<dyn Read + Send>, LinkError> 
     Ok(Box::new(port.map_err(|error| explain(name, error))?))
 }
 
-/// Why a port does not open.
 fn explain(name: &str, error: serialport::Error) -> LinkError {
     let name = name.to_owned();
     match error.kind() {

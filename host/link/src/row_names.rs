@@ -6,7 +6,7 @@
 //!
 //! Only [`Board::open`] opens a port. Only [`Names::write`] changes the file.
 
-use super::port::{calling_out, is_same, is_uno, listed};
+use super::port::{calling_out, is_same, listed, name_at};
 use super::settings_file::no_toml;
 use super::{Link, LinkError, Wire, find_uno};
 use files::{FileError, bounded_file, whole_file};
@@ -25,11 +25,9 @@ pub const ALL: &str = "all";
 /// Linux keeps links to ports here, by USB socket.
 const BY_PLACE: &str = "/dev/serial/by-path";
 
-/// The keys of the file.
 const SERIAL_NUMBER: &str = "serial_number";
 const PORT: &str = "port";
 
-/// The head of a new file.
 const HEAD: &str = "\
 # The rows of a machine, in their order: `weeder rows` lists and names them.
 # A row is known by its board's USB serial number, or by the port at which the board is.
@@ -96,11 +94,11 @@ impl Board {
         let path = Path::new(port);
         let ports = listed()?;
         // The list of ports has the link's present target.
-        let listed = ports.iter().find(|listed| is_same(&listed.port_name, port));
-        match listed {
-            Some(listed) if serial_number(listed).is_some() => Ok(of(listed, &ports, Path::new(BY_PLACE))),
+        match ports.iter().find(|listed| is_same(&listed.port_name, port)) {
             // A user's own link may lead to another port some day.
-            Some(listed) if listed.port_name == calling_out(port) => Ok(of(listed, &ports, Path::new(BY_PLACE))),
+            Some(listed) if serial_number(listed).is_some() || listed.port_name == calling_out(port) => {
+                Ok(of(listed, &ports, Path::new(BY_PLACE)))
+            }
             None if !path.exists() => Err(LinkError::Absent(port.to_owned())),
             // An absolute path is valid in any folder.
             _ => Ok(Self::Port(std::path::absolute(path).map_or(port.to_owned(), |path| path.display().to_string()))),
@@ -147,7 +145,6 @@ fn numbered(number: &str, ports: &[SerialPortInfo]) -> Result<String, LinkError>
     }
 }
 
-/// The serial number of the board at a port, if it has one.
 fn serial_number(port: &SerialPortInfo) -> Option<&str> {
     match &port.port_type {
         SerialPortType::UsbPort(usb) => usb.serial_number.as_deref().map(str::trim).filter(|number| !number.is_empty()),
@@ -177,7 +174,7 @@ fn of(port: &SerialPortInfo, ports: &[SerialPortInfo], by_place: &Path) -> Board
 pub fn plugged() -> Result<Vec<Plugged>, LinkError> {
     let ports = listed()?;
     let board = |port: &SerialPortInfo| of(port, &ports, Path::new(BY_PLACE));
-    let unos = ports.iter().filter(|port| is_uno(port));
+    let unos = ports.iter().filter(|port| name_at(port).is_some());
     Ok(unos.map(|port| Plugged { port: port.port_name.clone(), board: board(port) }).collect())
 }
 

@@ -37,14 +37,13 @@ pub enum What {
         /// The command.
         command: String,
         /// Why.
-        why: String,
+        why: &'static str,
     },
 }
 
 /// Time in which a command must be typed.
 const WAIT: Duration = Duration::from_secs(3);
 
-/// An order to a row's thread.
 enum Order {
     /// A command and its deadline.
     Type(String, Moment),
@@ -68,12 +67,9 @@ impl Rows {
             .map(|(row, open)| {
                 let (orders, ordered) = mpsc::channel();
                 let (tried, first) = mpsc::channel();
-                let talk = Talk { row, heard: sender.clone() };
-                thread::spawn(move || {
-                    let mut connection = Connection::waiting_for(open);
-                    connection.session.keeps_hold = true;
-                    talk.run(connection, &ordered, tried);
-                });
+                let heard = sender.clone();
+                let tell = move |what| heard.send(Heard { row, at: Instant::now(), what }).is_ok();
+                thread::spawn(move || run(open, &ordered, tried, tell));
                 (orders, first)
             })
             .unzip();
@@ -122,51 +118,42 @@ impl Rows {
     }
 }
 
-/// A row's thread.
-struct Talk {
-    row: usize,
-    heard: Sender<Heard>,
-}
-
-impl Talk {
-    /// Runs until all senders of orders and all receivers of events are gone. `tried` gets the result of the first try.
-    fn run(self, mut connection: Connection, orders: &Receiver<Order>, tried: Sender<Option<LinkError>>) {
-        let mut tried = Some(tried);
+/// A row's thread: runs until all senders of orders and all receivers of events are gone. `tried` gets the result of the
+/// first try. `tell` returns false if the receiver is gone.
+fn run(open: Opener, orders: &Receiver<Order>, tried: Sender<Option<LinkError>>, tell: impl Fn(What) -> bool) {
+    let mut connection = Connection::waiting_for(open);
+    connection.session.keeps_hold = true;
+    let mut tried = Some(tried);
+    loop {
         loop {
-            loop {
-                match orders.try_recv() {
-                    Ok(Order::Hold) => drop(connection.session.hold()),
-                    Ok(Order::Type(command, deadline)) => self.type_or_report(&mut connection, command, deadline),
-                    Err(TryRecvError::Empty) => break,
-                    Err(TryRecvError::Disconnected) => return,
+            let session = &mut connection.session;
+            match orders.try_recv() {
+                Ok(Order::Hold) => drop(session.hold()),
+                Ok(Order::Type(command, deadline)) => {
+                    let why = if !session.is_connected() {
+                        "the row is not there"
+                    } else if session.command(&command, deadline).is_none() {
+                        "it is no command, or too many wait"
+                    } else {
+                        continue;
+                    };
+                    tell(What::NotTyped { command, why });
                 }
-            }
-            let happened = connection.turn(Moment::now());
-            if !happened.into_iter().all(|happening| self.tell(what(happening))) {
-                return;
-            }
-            let failure = connection.session.take_failure();
-            if failure.is_some() || connection.session.is_connected() {
-                // The receiver is gone if the caller no longer waits.
-                tried.take().map(|tried| tried.send(failure));
-            }
-            if !connection.session.is_open() {
-                thread::sleep(PAUSE);
+                Err(TryRecvError::Empty) => break,
+                Err(TryRecvError::Disconnected) => return,
             }
         }
-    }
-
-    fn type_or_report(&self, connection: &mut Connection, command: String, deadline: Moment) {
-        if !connection.session.is_connected() {
-            self.tell(What::NotTyped { command, why: "the row is not there".to_owned() });
-        } else if connection.session.command(&command, deadline).is_none() {
-            self.tell(What::NotTyped { command, why: "it is no command, or too many wait".to_owned() });
+        if !connection.turn(Moment::now()).into_iter().all(|happening| tell(what(happening))) {
+            return;
         }
-    }
-
-    /// Returns false if the receiver is gone.
-    fn tell(&self, what: What) -> bool {
-        self.heard.send(Heard { row: self.row, at: Instant::now(), what }).is_ok()
+        let failure = connection.session.take_failure();
+        if failure.is_some() || connection.session.is_connected() {
+            // The receiver is gone if the caller no longer waits.
+            tried.take().map(|tried| tried.send(failure));
+        }
+        if !connection.session.is_open() {
+            thread::sleep(PAUSE);
+        }
     }
 }
 
@@ -179,7 +166,7 @@ fn what(happening: Happening) -> What {
         Happening::Unanswered { command, why: Unanswered::Held, .. } => (command, "hold came first"),
         happening => return What::Happened(happening),
     };
-    What::NotTyped { command, why: why.to_owned() }
+    What::NotTyped { command, why }
 }
 
 /// The state of one row in a HOLD to all.
@@ -238,12 +225,9 @@ impl Hold {
             Held::Obeyed(time) => Some((time, name)),
             _ => None,
         });
-        let (count, all) = (obeyed.clone().count(), self.rows.len());
-        let last = obeyed.min_by_key(|&(time, _)| Reverse(time));
-        let mut parts = vec![match last {
-            Some((time, _)) => format!("HOLD {count} of {all} in {} ms", time.as_millis()),
-            None => format!("HOLD {count} of {all}"),
-        }];
+        let (count, last) = (obeyed.clone().count(), obeyed.min_by_key(|&(time, _)| Reverse(time)));
+        let time = last.map_or_else(String::new, |(time, _)| format!(" in {} ms", time.as_millis()));
+        let mut parts = vec![format!("HOLD {count} of {}{time}", self.rows.len())];
         for (what, state) in
             [("NOT THERE", Held::NotThere), ("REFUSED", Held::Refused), ("no answer yet", Held::Waiting)]
         {

@@ -294,12 +294,8 @@ impl Session {
         let (waited, is_silent) = (self.waited, std::mem::replace(&mut self.is_silent, true));
         let is_over = |since: Duration, patience: Duration| waited.saturating_sub(since) > patience;
         match &mut self.state {
-            State::Closed => {}
-            State::Starting { since } => {
-                if is_over(*since, BOOT) {
-                    self.settle();
-                }
-            }
+            State::Starting { since } if is_over(*since, BOOT) => self.settle(),
+            State::Closed | State::Starting { .. } => {}
             State::Settling { since, heard } => {
                 if !is_silent {
                     *heard = waited;
@@ -427,38 +423,35 @@ impl Session {
     }
 
     fn take_answer(&mut self, said: ConsoleLine, line: String) {
-        let is_end = matches!(said, ConsoleLine::End { .. });
-        let is_done = said == ConsoleLine::End { error: None };
         // The end of an abandoned answer is ignored.
         let Some(asked) = self.asked.front_mut() else { return };
-        if asked.number.is_some() {
+        let is_own = asked.number.is_none();
+        if !is_own {
             self.turn.happened.push(Happening::Answer(line.clone()));
-        } else if !is_end {
-            match said {
-                // At once, not at the answer's end: a log and a map take the machine's position from it.
-                ConsoleLine::Status(status) if self.state == State::Ready => {
-                    return self.report(Happening::Status(status, line));
-                }
-                _ => asked.answer.push(line.clone()),
+        }
+        let refusal = match said {
+            ConsoleLine::End { error } => error.map(|_| line),
+            // At once, not at the answer's end: a log and a map take the machine's position from it.
+            ConsoleLine::Status(status) if is_own && self.state == State::Ready => {
+                return self.report(Happening::Status(status, line));
             }
-        }
-        if !is_end {
-            return;
-        }
+            _ => return asked.answer.extend(is_own.then_some(line)),
+        };
         let Some(Asked { line: command, number, answer, .. }) = self.asked.pop_front() else { return };
-        let refusal = (!is_done).then_some(line);
         if let Some(number) = number {
-            if is_done {
+            if refusal.is_none() {
                 self.own.extend(self.changed_by(&command).map(str::to_owned));
             }
             self.turn.happened.push(Happening::Answered { number, command, refusal });
         } else if let State::Asking(question) = self.state {
-            self.take_first_answer(question, command, answer, refusal);
-        } else if is_done {
-            self.turn.happened.extend(parse_answer(&command, answer));
-        } else {
+            self.take_first_answer(question, answer, refusal);
+        } else if refusal.is_some() {
             // Noise has damaged the line: ask again.
             self.own.insert(command);
+        } else if command == SETTINGS {
+            self.turn.happened.push(Happening::Settings(Shown::by(&answer).settings, answer));
+        } else if command == EXAMPLES {
+            self.turn.happened.push(Happening::Examples(answer));
         }
     }
 
@@ -475,15 +468,6 @@ impl Session {
             Action::EventsOff => self.keeps_events.then_some(EVENTS),
             _ => None,
         }
-    }
-}
-
-/// The meaning of the answer to one of the session's own questions, if it has not been reported yet.
-fn parse_answer(question: &str, answer: Vec<String>) -> Option<Happening> {
-    match question {
-        SETTINGS => Some(Happening::Settings(Shown::by(&answer).settings, answer)),
-        EXAMPLES => Some(Happening::Examples(answer)),
-        _ => None,
     }
 }
 

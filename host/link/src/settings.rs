@@ -7,6 +7,7 @@ use super::{ConsoleLine, Link, LinkError, Mode, Status};
 pub use control::settings::{Contradiction, Setting, Settings};
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 use thiserror::Error;
 
 /// Why settings could not be read or changed.
@@ -44,19 +45,16 @@ pub fn helps() -> BTreeMap<String, String> {
 
 /// A setting's unit; empty for a count.
 pub fn unit(setting: Setting) -> String {
-    // The console writes the unit behind a number, with its blank.
     setting.unit().to_string().trim_start().to_owned()
 }
 
 /// A setting's range, with its unit and default.
 pub fn range(setting: Setting) -> String {
-    let description = setting.description();
     if setting.is_switched() {
-        return format!("true or false, default {}", description.default == 1);
+        return format!("true or false, default {}", setting.default() == 1);
     }
-    let unit = unit(setting);
-    let space = if unit.is_empty() { "" } else { " " };
-    format!("{} to {}{space}{unit}, default {}", description.least, description.greatest, description.default)
+    // The console writes the unit behind a number, with its blank.
+    format!("{} to {}{}, default {}", setting.least(), setting.greatest(), setting.unit(), setting.default())
 }
 
 /// Which settings contradict each other, and what would be right.
@@ -120,8 +118,8 @@ pub struct OtherSetting {
     pub name: String,
     /// Its value.
     pub value: u16,
-    /// Its least and greatest value.
-    pub range: (u16, u16),
+    /// Its valid values.
+    pub range: RangeInclusive<u16>,
     /// Whether it is a switch.
     pub is_switched: bool,
     /// Its unit; empty for a count.
@@ -140,14 +138,22 @@ impl Shown {
             } else if let ConsoleLine::Setting { name, value, unit, least, greatest, is_switched, .. } =
                 ConsoleLine::parse(line)
             {
-                shown.others.push(OtherSetting { name, value, range: (least, greatest), is_switched, unit });
+                shown.others.push(OtherSetting { name, value, range: least..=greatest, is_switched, unit });
             }
         }
         shown
     }
+
+    /// The machine's own setting of this name, if the machine takes the value.
+    ///
+    /// # Errors
+    /// If it does not.
+    pub fn takes(&self, foreign: &Foreign) -> Result<&OtherSetting, SettingsError> {
+        let is_it = |own: &&OtherSetting| own.name == foreign.name && own.range.contains(&foreign.value);
+        self.others.iter().find(is_it).ok_or_else(|| SettingsError::NotKnown(foreign.problem.clone()))
+    }
 }
 
-/// This program's version.
 const OWN: &str = env!("CARGO_PKG_VERSION");
 
 /// Says that the machine's firmware has another version than this program, and what to do. `None` if it has this version
@@ -158,8 +164,7 @@ pub fn other_version(version: &str, lines: &[String]) -> Option<String> {
     // Without lines, nothing is known of its settings.
     let missing = missing.into_iter().filter(|_| !lines.is_empty()).map(name);
     let missing: Vec<String> = missing.filter(|name| !others.contains(name)).collect();
-    let order = numbers(version).cmp(&numbers(OWN));
-    let mut said = match order {
+    let mut said = match numbers(version).cmp(&numbers(OWN)) {
         Ordering::Greater => {
             format!("the firmware {version} is newer than this program, {OWN}: take the `weeder` of that version")
         }
@@ -233,9 +238,8 @@ pub fn follow_wheel(before: &Settings, after: &mut Settings) {
 /// A pulse width near the target of `setting` that differs from the present and target values of both pulses.
 fn beside(setting: Setting, now: &Settings, to: &Settings) -> u16 {
     let taken = [now, to].map(|settings| [settings.get(Setting::ServoInUs), settings.get(Setting::ServoOutUs)]);
-    let description = setting.description();
     let wanted = to.get(setting);
-    (description.least..=description.greatest)
+    (setting.least()..=setting.greatest())
         .filter(|pulse| !taken.as_flattened().contains(pulse))
         .min_by_key(|pulse| pulse.abs_diff(wanted))
         .unwrap_or(wanted)
@@ -250,18 +254,6 @@ pub struct Foreign {
     pub value: u16,
     /// What would be right for this program, with the file's line.
     pub problem: String,
-}
-
-impl Shown {
-    /// The machine's own setting of this name, if the machine takes the value.
-    ///
-    /// # Errors
-    /// If it does not.
-    pub fn takes(&self, foreign: &Foreign) -> Result<&OtherSetting, SettingsError> {
-        let own = self.others.iter().find(|own| own.name == foreign.name);
-        let own = own.filter(|own| (own.range.0..=own.range.1).contains(&foreign.value));
-        own.ok_or_else(|| SettingsError::NotKnown(foreign.problem.clone()))
-    }
 }
 
 /// Sets some settings, leaves the others unchanged, and reads all back. `save` saves them. Returns the changed settings.
@@ -279,40 +271,37 @@ pub fn push(
     save: bool,
 ) -> Result<Vec<String>, SettingsError> {
     let shown = read_shown(link)?;
-    let (own, known): (Vec<_>, Vec<_>) =
-        wanted.iter().partition::<Vec<(Setting, u16)>, _>(|(setting, _)| shown.missing.contains(setting));
-    let foreign = foreign.iter().cloned().chain(own.into_iter().map(|(setting, value)| Foreign {
-        problem: format!("{} {value} is wanted", name(setting)),
-        name: name(setting),
-        value,
-    }));
+    let (before, mut after) = (&shown.settings, shown.settings.clone());
+    let mut foreign = foreign.to_vec();
+    for &(setting, value) in wanted {
+        let name = name(setting);
+        if shown.missing.contains(&setting) {
+            foreign.push(Foreign { problem: format!("{name} {value} is wanted"), name, value });
+        } else {
+            // Values of settings are in their ranges.
+            let _ = after.set(setting, value);
+        }
+    }
     let mut changed = Vec::new();
-    for foreign in foreign {
-        let own = shown.takes(&foreign)?;
-        let value = match foreign.value {
-            value if !own.is_switched => value.to_string(),
-            0 => "off".to_owned(),
-            _ => "on".to_owned(),
-        };
+    for foreign in &foreign {
+        let own = shown.takes(foreign)?;
         if own.value != foreign.value {
+            let value = match foreign.value {
+                value if !own.is_switched => value.to_string(),
+                value => if value == 0 { "off" } else { "on" }.to_owned(),
+            };
             changed.push((foreign.name.clone(), format!("set {} {value}", foreign.name)));
         }
     }
-    let before = shown.settings;
-    let mut after = before.clone();
-    for &(setting, value) in &known {
-        // Values of settings are in their ranges.
-        let _ = after.set(setting, value);
-    }
     let wants_calibration = wanted.iter().any(|&(setting, _)| setting == Setting::TicksPerM);
     if !wants_calibration && !shown.missing.contains(&Setting::TicksPerM) {
-        follow_wheel(&before, &mut after);
+        follow_wheel(before, &mut after);
     }
     if let Some(contradiction) = after.contradiction().filter(|_| shown.missing.is_empty()) {
         return Err(SettingsError::Contradiction(explain(contradiction)));
     }
-    let steps = steps(&before, &after);
-    let needs_hold = save || !changed.is_empty() || steps.iter().any(|(setting, _)| setting.description().hold_only);
+    let steps = steps(before, &after);
+    let needs_hold = save || !changed.is_empty() || steps.iter().any(|(setting, _)| setting.is_hold_only());
     if needs_hold && status(link)?.mode == Mode::Work {
         return Err(SettingsError::AtWork);
     }
@@ -321,12 +310,13 @@ pub fn push(
         link.ask(&command)?;
     }
     let found = read_shown(link)?;
-    let is_compared = |setting: &Setting| !found.missing.contains(setting) && !shown.missing.contains(setting);
-    // A wheel of another version may have reset its calibration.
-    let is_compared =
-        |setting: &Setting| is_compared(setting) && (changed.is_empty() || *setting != Setting::TicksPerM);
-    let differs = |setting: &Setting| found.settings.get(*setting) != after.get(*setting);
-    if let Some(setting) = Setting::all().filter(is_compared).find(differs) {
+    let differs = |&setting: &Setting| {
+        ![&found, &shown].iter().any(|shown| shown.missing.contains(&setting))
+            // A wheel of another version may have reset its calibration.
+            && (changed.is_empty() || setting != Setting::TicksPerM)
+            && found.settings.get(setting) != after.get(setting)
+    };
+    if let Some(setting) = Setting::all().find(differs) {
         let (wanted, found) = (after.get(setting), found.settings.get(setting));
         return Err(SettingsError::NotTaken { setting: name(setting), wanted, found });
     }
@@ -397,14 +387,10 @@ mod tests {
 
     #[test]
     fn pulses_that_change_places_never_meet() {
-        let one = settings(&[(Setting::ServoInUs, 500), (Setting::ServoOutUs, 2500)]);
-        let other = settings(&[(Setting::ServoInUs, 2500), (Setting::ServoOutUs, 500)]);
-        assert_leads(&one, &other);
-        assert_leads(&other, &one);
-        let neighbours = settings(&[(Setting::ServoInUs, 2499), (Setting::ServoOutUs, 2500)]);
-        let changed = settings(&[(Setting::ServoInUs, 2500), (Setting::ServoOutUs, 2499)]);
-        assert_leads(&neighbours, &changed);
-        assert_leads(&changed, &neighbours);
+        for (one, other) in [(500, 2500), (2500, 500), (2499, 2500), (2500, 2499)] {
+            let pulses = |in_us, out_us| settings(&[(Setting::ServoInUs, in_us), (Setting::ServoOutUs, out_us)]);
+            assert_leads(&pulses(one, other), &pulses(other, one));
+        }
     }
 
     #[test]
@@ -421,8 +407,7 @@ mod tests {
             loop {
                 let mut settings = Settings::new();
                 for setting in Setting::all() {
-                    let description = setting.description();
-                    settings.set(setting, random.random_range(description.least..=description.greatest)).unwrap();
+                    settings.set(setting, random.random_range(setting.least()..=setting.greatest())).unwrap();
                 }
                 if settings.contradiction().is_none() {
                     return settings;

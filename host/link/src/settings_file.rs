@@ -9,7 +9,6 @@ use files::{FileError, bounded_file, whole_file};
 use std::path::Path;
 use toml_edit::{Decor, DocumentMut, Item, Key, TomlError, Value};
 
-/// The head of a new file.
 const HEAD: &str = "\
 # Settings of a weeder. `weeder settings push` sends them to the machine, `weeder settings diff` compares.
 # Settings that are not named here are not changed.
@@ -47,11 +46,6 @@ pub fn write(path: &Path, shown: &Shown) -> Result<(), FileError> {
     written.map_err(|source| FileError::unwritten(path, source))
 }
 
-/// A switch as TOML and JSON write it: true or false. `None` for other settings.
-pub fn is_true(setting: Setting, value: u16) -> Option<bool> {
-    setting.is_switched().then_some(value != 0)
-}
-
 /// An error in the line where a text is no TOML.
 pub(super) fn no_toml(path: &Path, text: &str, error: &TomlError) -> FileError {
     let start = error.span().map_or(0, |span| span.start);
@@ -65,30 +59,34 @@ fn parse(path: &Path, text: &str) -> Result<(DocumentMut, Named), FileError> {
     let mut old_merge_gap = None;
     for (key, item) in document.iter() {
         let wrong = |problem| FileError::at_key(path, text, key, problem);
+        let number = item.as_integer().and_then(|number| u16::try_from(number).ok());
         if key == OLD_MERGE_GAP {
-            let ticks = item.as_integer().and_then(|ticks| u16::try_from(ticks).ok()).filter(|&ticks| ticks <= 2000);
             let right = || wrong(format!("{key} has to be a whole number, 0 to 2000; now it is merge_gap_mm, in mm"));
-            old_merge_gap = Some(ticks.ok_or_else(right)?);
+            old_merge_gap = Some(number.filter(|&ticks| ticks <= 2000).ok_or_else(right)?);
             continue;
         }
-        let known = Setting::find(key.as_bytes());
-        if let Some(setting) = known
-            && let Some(value) = value(setting, item)
+        let (known, is_switch) = (Setting::find(key.as_bytes()), item.is_bool());
+        let value = number.or(item.as_bool().map(u16::from));
+        if let (Some(setting), Some(value)) = (known, value)
+            && setting.is_switched() == is_switch
+            && setting.allows(value)
         {
             settings.push((setting, value));
             continue;
         }
         let problem = wrong(match known {
-            Some(setting) => format!("{key} is `{}`: it has to be {}", item.to_string().trim(), right(setting)),
+            Some(setting) => {
+                let whole = if setting.is_switched() { "" } else { "a whole number, " };
+                format!("{key} is `{}`: it has to be {whole}{}", item.to_string().trim(), range(setting))
+            }
             None => {
                 let known: Vec<String> = Setting::all().map(name).collect();
                 format!("there is no setting `{key}`: there are {}", known.join(", "))
             }
         });
         // Another version may have the setting, or a wider range.
-        let number = item.as_integer().and_then(|value| u16::try_from(value).ok());
-        let value = number.filter(|_| known.is_none_or(|setting| !setting.is_switched()));
-        match value.or_else(|| item.as_bool().filter(|_| known.is_none()).map(u16::from)) {
+        let is_possible = known.is_none_or(|setting| !setting.is_switched() && !is_switch);
+        match value.filter(|_| is_possible) {
             Some(value) => foreign.push(Foreign { name: key.to_owned(), value, problem: problem.to_string() }),
             None => return Err(problem),
         }
@@ -106,23 +104,7 @@ fn merge_gap_mm(ticks: u16, settings: &[(Setting, u16)]) -> u16 {
         all.set(setting, value).expect("what a file says has been checked");
     }
     let millimetres = f64::from(ticks) * 1000.0 / f64::from(all.wheel().ticks(1000).0);
-    millimetres.round().min(Setting::MergeGapMm.description().greatest.into()) as u16
-}
-
-/// The value of an item for a setting, if it is valid.
-fn value(setting: Setting, item: &Item) -> Option<u16> {
-    if setting.is_switched() {
-        return item.as_bool().map(u16::from);
-    }
-    let description = setting.description();
-    let value = u16::try_from(item.as_integer()?).ok()?;
-    (description.least..=description.greatest).contains(&value).then_some(value)
-}
-
-/// The valid values of a setting.
-fn right(setting: Setting) -> String {
-    let whole = if setting.is_switched() { "" } else { "a whole number, " };
-    format!("{whole}{}", range(setting))
+    millimetres.round().min(Setting::MergeGapMm.greatest().into()) as u16
 }
 
 fn updated(path: &Path, old: &str, shown: &Shown) -> Result<String, FileError> {
@@ -143,8 +125,11 @@ fn updated(path: &Path, old: &str, shown: &Shown) -> Result<String, FileError> {
         (name(setting), shown.settings.get(setting), setting.is_switched(), comment)
     });
     let foreign = shown.others.iter().map(|OtherSetting { name, value, range, is_switched, unit }| {
-        let range =
-            if *is_switched { "true or false".to_owned() } else { format!("{} to {} {unit}", range.0, range.1) };
+        let range = if *is_switched {
+            "true or false".to_owned()
+        } else {
+            format!("{} to {} {unit}", range.start(), range.end())
+        };
         let comment =
             format!("\n# only the machine's firmware knows this setting, or this value\n# {}\n", range.trim_end());
         (name.clone(), *value, *is_switched, comment)
@@ -188,7 +173,7 @@ mod tests {
         let other = |name: &str, value, is_switched| OtherSetting {
             name: name.to_owned(),
             value,
-            range: (0, 1200),
+            range: 0..=1200,
             is_switched,
             unit: if is_switched { String::new() } else { "mm".to_owned() },
         };
@@ -202,17 +187,13 @@ mod tests {
         assert_eq!(values, [("wheel_mm", 900), ("tilt_mm", 7), ("lamp", 1)]);
         assert!(named.foreign.iter().all(|foreign| shown.takes(foreign).is_ok()));
         let error = Shown::default().takes(&named.foreign[1]).unwrap_err().to_string();
-        assert!(
-            error.contains("there is no setting `tilt_mm`: there are ") && error.contains("nothing was sent"),
-            "{error}"
-        );
+        assert!(error.contains("there is no setting `tilt_mm`: there are "), "{error}");
+        assert!(error.contains("nothing was sent"), "{error}");
     }
 
     #[test]
     fn a_new_file_holds_every_setting_with_its_help_and_range_and_is_read_back() {
-        let mut settings = Settings::new();
-        settings.set(Setting::WheelMm, 405).unwrap();
-        settings.set(Setting::EndSwitch, 1).unwrap();
+        let settings = rig::settings(&[(Setting::WheelMm, 405), (Setting::EndSwitch, 1)]);
         let text = updated(Path::new("machine.toml"), HEAD, &shown(settings.clone())).unwrap();
         assert!(text.starts_with(HEAD), "{text}");
         let wheel = "\n# wheel diameter\n# 200 to 800 mm, default 400\nwheel_mm = 405\n";

@@ -8,29 +8,36 @@ use control::ground::features::Features;
 use control::ground::nearest::Nearest;
 use control::memory::Volatile;
 use rig::{Rig, ScriptedPort};
-use std::cell::RefCell;
+use std::assert_matches;
 
-/// A port that sends `greeting` before the first line, and answers each line by `answer`.
-fn script(greeting: &str, mut answer: impl FnMut(&str) -> Vec<u8>) -> impl Port {
-    let mut greeting = greeting.as_bytes().to_vec();
-    ScriptedPort::new(move |line: Option<&str>| Some(line.map_or_else(|| std::mem::take(&mut greeting), &mut answer)))
+const VERSION: &[u8] = b"weeder 0.2.0\r\nok\r\n";
+
+/// A link over a port that answers each line by `answer`.
+fn over(resets: bool, mut answer: impl FnMut(&str) -> Vec<u8> + 'static) -> Result<Link, LinkError> {
+    let script = move |line: Option<&str>| Some(line.map_or_else(Vec::new, &mut answer));
+    Link::over(Wire::over(ScriptedPort::new(script), resets))
 }
 
 /// A link to a firmware that answers `version` correctly, and everything else by `answer`.
 fn link(answer: impl Fn(&str) -> Vec<u8> + 'static) -> Link {
     let answer = move |line: &str| match line {
         "" => Vec::new(),
-        "version" => b"weeder 0.2.0\r\nok\r\n".to_vec(),
+        "version" => VERSION.to_vec(),
         line => answer(line),
     };
-    Link::over(Wire::over(script("", answer), false)).expect("the firmware answers")
+    over(false, answer).expect("the firmware answers")
 }
 
 #[test]
 fn the_greeting_after_a_reset_is_waited_for_and_the_version_asked() {
-    let answer = |line: &str| if line.is_empty() { Vec::new() } else { b"weeder 0.2.0\r\nok\r\n".to_vec() };
-    let greeting = "\0\x1Bgarbage\r\nweeder 0.2.0, reset by power, state hold, tool out; help lists the commands\r\n";
-    let link = Link::over(Wire::over(script(greeting, answer), true)).unwrap();
+    let mut greeting =
+        &b"\0\x1Bgarbage\r\nweeder 0.2.0, reset by power, state hold, tool out; help lists the commands\r\n"[..];
+    let script = move |line: Option<&str>| match line {
+        None => Some(std::mem::take(&mut greeting).to_vec()),
+        Some("") => Some(Vec::new()),
+        Some(_) => Some(VERSION.to_vec()),
+    };
+    let link = Link::over(Wire::over(ScriptedPort::new(script), true)).unwrap();
     assert_eq!(link.version(), "0.2.0");
 }
 
@@ -40,9 +47,9 @@ fn an_uno_that_starts_while_it_is_asked_is_asked_again() {
     let answer = move |line: &str| {
         lines += 1;
         let greeting = b"weeder 0.2.0, reset by button, state hold\r\n".to_vec();
-        if lines <= 2 { greeting } else { (machine(line).join("\r\n") + "\r\n").into_bytes() }
+        if lines <= 2 { greeting } else { machine(line) }
     };
-    let link = Link::over(Wire::over(script("", answer), false)).unwrap();
+    let link = over(false, answer).unwrap();
     assert!(link.version().starts_with(env!("CARGO_PKG_VERSION")), "{}", link.version());
 }
 
@@ -51,17 +58,17 @@ fn an_answer_that_comes_late_and_slowly_belongs_to_its_own_question() {
     const SILENT_READS_BETWEEN_LINES: usize = 15;
     let mut machine = machine();
     // The Uno starts after the first questions are typed, and then answers them.
-    let mut lines = VecDeque::from(["weeder 0.2.0, reset by external, state hold".to_owned()]);
+    let mut to_send = b"weeder 0.2.0, reset by external, state hold\r\n".to_vec();
     let mut reads = 0;
     let port = ScriptedPort::new(move |line: Option<&str>| {
         match line {
             Some("") => {}
-            Some(line) => lines.extend(machine(line)),
+            Some(line) => to_send.extend(machine(line)),
             None => reads += 1,
         }
         let is_due = line.is_none() && reads % SILENT_READS_BETWEEN_LINES == 0;
-        let due = if is_due { lines.pop_front() } else { None };
-        Some(due.map_or_else(Vec::new, |line| format!("{line}\r\n").into_bytes()))
+        let end = to_send.iter().position(|&byte| byte == b'\n').filter(|_| is_due);
+        Some(to_send.drain(..end.map_or(0, |end| end + 1)).collect())
     });
     let mut link = Link::over(Wire::over(port, false)).expect("the firmware answers");
     assert_eq!(settings::read(&mut link).expect("all are shown"), settings::Settings::new());
@@ -75,9 +82,9 @@ fn a_line_that_is_cut_before_an_answer_is_no_other_firmware() {
         let answer = move |line: &str| {
             asked += usize::from(line == "version");
             let cut = if asked == 1 && line == "version" { cut } else { "" };
-            (cut.to_owned() + &machine(line).join("\r\n") + "\r\n").into_bytes()
+            [cut.as_bytes(), &machine(line)].concat()
         };
-        let link = Link::over(Wire::over(script("", answer), false));
+        let link = over(false, answer);
         assert!(link.is_ok(), "{cut}: {:?}", link.err());
     }
 }
@@ -98,16 +105,16 @@ fn a_refusal_is_an_error_with_the_firmware_s_words() {
 }
 
 #[test]
-fn a_port_at_which_nothing_answers_is_given_up() {
-    let error = Link::over(Wire::over(script("", |_: &str| Vec::new()), true)).err().unwrap();
-    assert!(error.to_string().contains("`weeder flash`"), "{error}");
-}
-
-#[test]
-fn noise_without_an_end_is_given_up_as_noise() {
+fn silence_noise_and_another_firmware_are_given_up() {
     let noise: Vec<u8> = (0..=255).filter(|&byte| byte != b'\n' && byte != b'\r').cycle().take(60_000).collect();
-    let error = Link::over(Wire::over(script("", move |_: &str| noise.clone()), false)).err().unwrap();
-    assert!(matches!(error, LinkError::Noise), "{error}");
+    for (resets, answer, problem) in [
+        (true, Vec::new(), "`weeder flash`"),
+        (false, noise, "the port sends no text"),
+        (false, b"Grbl 1.1h\r\nok\r\n".to_vec(), "not the weeder's firmware that answers, but \"Grbl 1.1h\""),
+    ] {
+        let error = over(resets, move |_| answer.clone()).err().unwrap().to_string();
+        assert!(error.contains(problem), "{error}");
+    }
 }
 
 #[test]
@@ -118,22 +125,16 @@ fn text_without_an_end_is_given_up_and_only_its_end_is_shown() {
 }
 
 #[test]
-fn another_firmware_is_recognised() {
-    let error = Link::over(Wire::over(script("", |_: &str| b"Grbl 1.1h\r\nok\r\n".to_vec()), false)).err().unwrap();
-    assert!(error.to_string().contains("not the weeder's firmware that answers, but \"Grbl 1.1h\""), "{error}");
-}
-
-#[test]
 fn a_reset_while_it_is_asked_is_an_error() {
     let mut link = link(|_| b"weeder 0.2.0, reset by brown_out, state hold\r\nok\r\n".to_vec());
-    assert!(matches!(link.ask("save"), Err(LinkError::Restarted(command)) if command == "save"));
+    assert_matches!(link.ask("save"), Err(LinkError::Restarted(command)) if command == "save");
 }
 
 #[test]
 fn a_command_that_would_be_two_lines_or_no_text_is_not_typed() {
     let mut link = link(|line| panic!("`{line}` was typed"));
     for command in ["hold\nstart now", "h\u{00E4}lt", &"x".repeat(COMMAND_LENGTH + 1)] {
-        assert!(matches!(link.send(command), Err(LinkError::NoCommand(_))), "{command:?}");
+        assert_matches!(link.send(command), Err(LinkError::NoCommand(_)));
     }
 }
 
@@ -144,17 +145,16 @@ fn a_port_that_goes_away_says_so() {
 }
 
 /// The firmware's decisions in HOLD, with its built-in examples, which answer a line.
-fn machine() -> impl FnMut(&str) -> Vec<String> {
+fn machine() -> impl FnMut(&str) -> Vec<u8> {
     let mut rig = Rig::new(Nearest::new(&EXAMPLES[..], Volatile::new()));
-    move |line| rig.ask(line)
+    move |line| (rig.ask(line).join("\r\n") + "\r\n").into_bytes()
 }
 
 /// A link to the machine, after these typed lines.
 fn link_to_machine(typed: &[&str]) -> Link {
-    let machine = RefCell::new(machine());
-    let answer = move |line: &str| (machine.borrow_mut()(line).join("\r\n") + "\r\n").into_bytes();
-    typed.iter().for_each(|line| drop(answer(line)));
-    link(answer)
+    let mut machine = machine();
+    typed.iter().for_each(|line| drop(machine(line)));
+    over(false, machine).expect("the firmware answers")
 }
 
 #[test]
@@ -174,7 +174,6 @@ fn a_machine_at_work_is_not_taught_and_forgets_nothing() {
     let mut link = link_to_machine(&[]);
     examples::push(&mut link, &[one], false).expect("it is in HOLD");
     link.ask("start").expect("it goes to work");
-    let refused = examples::push(&mut link, &[other], true);
-    assert!(matches!(refused, Err(ExamplesError::AtWork)), "{refused:?}");
+    assert_matches!(examples::push(&mut link, &[other], true), Err(ExamplesError::AtWork));
     assert_eq!(examples::read(&mut link).expect("it lists them"), [(0, one)]);
 }

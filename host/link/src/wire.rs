@@ -1,11 +1,11 @@
 //! A wire to an Uno: a connection that carries bytes both ways.
 
 use super::LinkError;
-use std::io::{self, ErrorKind, Read, Write};
+use std::io::{ErrorKind, Read, Write};
 
 /// A connection that carries bytes both ways.
 ///
-/// A read waits some hundredths of a second at most, and then fails with [`io::ErrorKind::TimedOut`]. A read of zero
+/// A read waits some hundredths of a second at most, and then fails with [`ErrorKind::TimedOut`]. A read of zero
 /// bytes, and any other error, means that the port is gone.
 pub trait Port: Read + Write {}
 
@@ -72,10 +72,5 @@ impl Wire {
             // The port is given up in any case.
             let _ = serial.clear(serialport::ClearBuffer::Output);
         }
-    }
-
-    /// Closes the port. The wire behaves as if the port were gone.
-    pub(crate) fn close(&mut self) {
-        *self = Self::over(io::empty(), false);
     }
 }

@@ -17,9 +17,6 @@ use std::f64::consts::PI;
 /// The longest distance between two statuses in ticks, some hundred metres.
 const LONGEST_TICKS: u32 = 1_000_000;
 
-/// The settings that make a count a distance, if the wheel is not calibrated.
-const NOMINAL: [Setting; 2] = [Setting::TicksPerRev, Setting::WheelMm];
-
 /// Millimetres in a tick of the encoder.
 pub fn tick_mm(settings: &Settings) -> f64 {
     let value = |setting| f64::from(settings.get(setting));
@@ -85,9 +82,8 @@ impl InUse {
         match action {
             Action::Set => {
                 if self.settings.change(setting, number).is_ok() {
-                    let is_set = |unknown: Setting| unknown == setting;
-                    let is_reset = |unknown| unknown == Setting::TicksPerM && setting.is_of_the_wheel();
-                    self.unknown.retain(|&unknown| !is_set(unknown) && !is_reset(unknown));
+                    let reset = setting.is_of_the_wheel().then_some(Setting::TicksPerM);
+                    self.unknown.retain(|&unknown| unknown != setting && Some(unknown) != reset);
                 }
             }
             Action::Save => self.saved = self.is_known().then(|| self.settings.clone()),
@@ -140,7 +136,6 @@ pub enum Followed {
     Unread,
 }
 
-/// The machine's position in an event.
 fn position(event: &EventLine) -> Option<i32> {
     match *event {
         EventLine::Detection { position, .. }
@@ -158,7 +153,6 @@ pub struct Follower {
     /// Commands without an answer so far.
     unanswered: VecDeque<Entry>,
     distance: Distance,
-    tick_mm: f64,
 }
 
 impl Follower {
@@ -175,23 +169,17 @@ impl Follower {
             }
             Kind::Setting if self.in_use.show(&entry.text) => Followed::Other,
             Kind::Setting => Followed::Unread,
-            Kind::Status => match Status::parse(&entry.text) {
-                Some(status) => {
-                    let goes_on = self.knows_wheel() && self.distance.take(status.position, self.tick_mm);
-                    Followed::Status(status, goes_on)
+            Kind::Status => Status::parse(&entry.text).map_or(Followed::Unread, |status| {
+                let goes_on = self.knows_wheel() && self.distance.take(status.position, self.tick_mm());
+                Followed::Status(status, goes_on)
+            }),
+            Kind::Event => EventLine::parse(&entry.text).map_or(Followed::Unread, |event| {
+                // A stretch may begin with an event.
+                if let (Some(position), None) = (position(&event), self.distance.last) {
+                    self.distance.take(position, self.tick_mm());
                 }
-                None => Followed::Unread,
-            },
-            Kind::Event => match EventLine::parse(&entry.text) {
-                Some(event) => {
-                    // A stretch may begin with an event.
-                    if let (Some(position), None) = (position(&event), self.distance.last) {
-                        self.distance.take(position, self.tick_mm);
-                    }
-                    Followed::Event(event)
-                }
-                None => Followed::Unread,
-            },
+                Followed::Event(event)
+            }),
             Kind::Command => {
                 self.unanswered.push_back(entry.clone());
                 Followed::Other
@@ -213,7 +201,6 @@ impl Follower {
             },
             _ => Followed::Other,
         };
-        self.tick_mm = tick_mm(self.in_use.settings());
         if !self.knows_wheel() {
             self.distance = Distance::default();
         }
@@ -228,16 +215,17 @@ impl Follower {
     /// Whether the wheel's distance is known.
     pub fn knows_wheel(&self) -> bool {
         let is_calibrated = self.in_use.settings().get(Setting::TicksPerM) > 0;
-        self.in_use.knows(&[Setting::TicksPerM]) && (is_calibrated || self.in_use.knows(&NOMINAL))
+        let nominal = [Setting::TicksPerRev, Setting::WheelMm];
+        self.in_use.knows(&[Setting::TicksPerM]) && (is_calibrated || self.in_use.knows(&nominal))
     }
 
     /// Millimetres in a tick.
     pub fn tick_mm(&self) -> f64 {
-        self.tick_mm
+        tick_mm(self.in_use.settings())
     }
 
     /// The distance at a position near the last status, in mm. `None` if it is unknown.
     pub fn mm(&self, position: i32) -> Option<f64> {
-        self.distance.at(position, self.tick_mm)
+        self.distance.at(position, self.tick_mm())
     }
 }

@@ -50,19 +50,6 @@ pub enum Kind {
     GpsMark,
 }
 
-impl Kind {
-    /// Its name in the file.
-    pub fn name(self) -> &'static str {
-        self.into()
-    }
-
-    /// Whether the operator sees such a line: the receiver was connected, was lost, or has a fault.
-    pub fn is_for_the_operator(self) -> bool {
-        matches!(self, Self::GpsFound | Self::GpsLost | Self::GpsMark)
-    }
-}
-
-/// The first line of a log.
 const HEADER: &str = "time_ms,kind,line";
 
 /// Why a log cannot be written.
@@ -74,6 +61,11 @@ pub enum LogError {
     /// The file is no log.
     #[error("{0} exists already and is no log: choose another name")]
     NoLog(PathBuf),
+}
+
+/// The end of the last whole line.
+fn end(bytes: &[u8]) -> usize {
+    bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1)
 }
 
 /// Writes a log.
@@ -102,7 +94,7 @@ impl LogWriter {
             return Err(LogError::NoLog(path.into()));
         }
         // Removes a last line that a power failure has cut off. It would damage the next line.
-        let whole = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1);
+        let whole = end(&bytes);
         file.set_len(whole as u64).and_then(|()| file.seek(SeekFrom::End(0))).map_err(failed)?;
         let found = bytes[..whole].iter().filter(|&&byte| byte == b'\n').count().saturating_sub(1) as u64;
         let mut log =
@@ -118,19 +110,11 @@ impl LogWriter {
         u64::try_from(self.began.elapsed().as_millis()).unwrap_or(u64::MAX)
     }
 
-    /// Writes an event of the session.
+    /// Writes an event of the session, with this time.
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn write(&mut self, happening: &Happening) -> Result<(), LogError> {
-        self.write_at(self.now_ms(), happening)
-    }
-
-    /// Writes an event of the session, with a time from another clock.
-    ///
-    /// # Errors
-    /// If the file cannot be written.
-    pub fn write_at(&mut self, time_ms: u64, happening: &Happening) -> Result<(), LogError> {
+    pub fn write(&mut self, time_ms: u64, happening: &Happening) -> Result<(), LogError> {
         match happening {
             Happening::Connected { version, shown, examples, .. } => {
                 self.line(time_ms, Kind::Connected, version)?;
@@ -170,7 +154,7 @@ impl LogWriter {
     fn line(&mut self, time_ms: u64, kind: Kind, line: &str) -> Result<(), LogError> {
         self.added += 1;
         // A record is one line of the table, even if the system's message about a lost port has several.
-        self.record([time_ms.to_string().as_str(), kind.name(), &in_a_line(line)])
+        self.record([time_ms.to_string().as_str(), kind.into(), &in_a_line(line)])
     }
 
     fn record<'a>(&mut self, fields: impl IntoIterator<Item = &'a str>) -> Result<(), LogError> {
@@ -220,6 +204,7 @@ pub fn parse(path: &Path, text: Vec<u8>) -> Result<Vec<Entry>, FileError> {
 }
 
 /// Reads a log in pieces, so that the whole text is not in memory.
+#[derive(Default)]
 pub struct Pieces {
     path: PathBuf,
     /// The header, and below it the wanted lines of a piece.
@@ -230,14 +215,13 @@ pub struct Pieces {
     cut: Vec<u8>,
     /// Lines that were read.
     lines: u64,
-    is_empty: bool,
+    has_entries: bool,
 }
 
 impl Pieces {
     /// A log before its first line. The path is for error messages.
     pub fn new(path: &Path) -> Self {
-        let (table, numbers, cut) = (String::new(), Vec::new(), Vec::new());
-        Self { path: path.into(), table, numbers, cut, lines: 0, is_empty: true }
+        Self { path: path.into(), ..Self::default() }
     }
 
     /// Parses the lines that end in the next bytes of the log, without the unwanted ones.
@@ -245,16 +229,15 @@ impl Pieces {
     /// # Errors
     /// As [`read`], except for a log without lines.
     pub fn take(&mut self, bytes: &[u8], is_wanted: impl FnMut(&str) -> bool) -> Result<Vec<Entry>, FileError> {
-        let end = |bytes: &[u8]| bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1);
-        let whole = end(bytes);
-        self.cut.extend_from_slice(&bytes[..whole]);
-        let mut text = if whole == 0 { Vec::new() } else { std::mem::take(&mut self.cut) };
+        let (whole, rest) = bytes.split_at(end(bytes));
+        self.cut.extend_from_slice(whole);
+        let mut text = if whole.is_empty() { Vec::new() } else { std::mem::take(&mut self.cut) };
         // The last line is complete only when the next one shows that no quotation mark is open.
         let last = end(&text[..text.len().saturating_sub(1)]);
         if text[last..].iter().filter(|&&byte| byte == b'"').count() % 2 == 1 {
             self.cut = text.split_off(last);
         }
-        self.cut.extend_from_slice(&bytes[whole..]);
+        self.cut.extend_from_slice(rest);
         self.lines(text, is_wanted)
     }
 
@@ -266,7 +249,7 @@ impl Pieces {
         let last = std::mem::take(&mut self.cut);
         let entries = self.lines(last, is_wanted)?;
         // For an empty log this returns the error for a missing header.
-        if self.is_empty { self.parse() } else { Ok(entries) }
+        if self.has_entries { Ok(entries) } else { self.parse() }
     }
 
     fn lines(&mut self, text: Vec<u8>, mut is_wanted: impl FnMut(&str) -> bool) -> Result<Vec<Entry>, FileError> {
@@ -285,7 +268,7 @@ impl Pieces {
         if self.numbers.len() < 2 {
             return Ok(Vec::new());
         }
-        self.is_empty = false;
+        self.has_entries = true;
         let entries = self.parse();
         self.table.truncate(self.table.find('\n').map_or(0, |end| end + 1));
         self.numbers.truncate(1);
@@ -310,30 +293,26 @@ mod tests {
 
     #[test]
     fn a_log_is_read_back_and_continued_after_a_cut_line() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("log.csv");
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let path = file.path();
         let answer = "speed_mm_s,spacing_mm \"quoted\"";
-        LogWriter::open(&path).unwrap().write(&Happening::Answer(answer.to_owned())).unwrap();
-        let mut cut = fs::read(&path).unwrap();
+        LogWriter::open(path).unwrap().write(0, &Happening::Answer(answer.to_owned())).unwrap();
+        let mut cut = fs::read(path).unwrap();
         cut.extend(b"17,sta");
-        fs::write(&path, cut).unwrap();
-        LogWriter::open(&path).unwrap().write(&Happening::Lost("no\nport".to_owned())).unwrap();
+        fs::write(path, cut).unwrap();
+        LogWriter::open(path).unwrap().write(0, &Happening::Lost("no\nport".to_owned())).unwrap();
         let entries: Vec<(u64, Kind, String)> =
-            read(&path).unwrap().into_iter().map(|entry| (entry.number, entry.kind, entry.text)).collect();
+            read(path).unwrap().into_iter().map(|entry| (entry.number, entry.kind, entry.text)).collect();
         assert_eq!(entries, [(2, Kind::Answer, answer.to_owned()), (3, Kind::Lost, r"no\nport".to_owned())]);
     }
 
     #[test]
     fn what_the_machine_shows_after_a_change_is_in_the_log() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("log.csv");
-        let lines = vec!["wheel_mm=410 mm from 200 to 800, default 400, saved 410".to_owned()];
-        LogWriter::open(&path)
-            .unwrap()
-            .write(&Happening::Settings(link::settings::Settings::new(), lines.clone()))
-            .unwrap();
-        let [entry] = &read(&path).unwrap()[..] else { panic!("one line") };
-        assert_eq!((entry.kind, &entry.text), (Kind::Answer, &lines[0]));
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let line = "wheel_mm=410 mm from 200 to 800, default 400, saved 410".to_owned();
+        let shown = Happening::Settings(link::settings::Settings::new(), vec![line.clone()]);
+        LogWriter::open(file.path()).unwrap().write(7, &shown).unwrap();
+        assert_eq!(read(file.path()).unwrap(), [Entry { number: 2, time_ms: 7, kind: Kind::Answer, text: line }]);
     }
 
     #[test]
@@ -352,11 +331,8 @@ mod tests {
                         entries.extend(pieces.end(|_| true)?);
                         Ok(entries)
                     };
-                    assert_eq!(
-                        in_pieces().map_err(|error: FileError| error.to_string()),
-                        as_one,
-                        "{text:?} by {length}"
-                    );
+                    let in_pieces = in_pieces().map_err(|error: FileError| error.to_string());
+                    assert_eq!(in_pieces, as_one, "{text:?} by {length}");
                 }
             }
         }

@@ -73,11 +73,8 @@ pub struct Difference {
 
 impl fmt::Display for Difference {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { line, logged, replayed } = self;
-        match line {
-            Some(line) => write!(formatter, "line {line}: the log has {logged}, the replay {replayed}"),
-            None => write!(formatter, "the log has {logged}, the replay {replayed}"),
-        }
+        let line = self.line.map_or_else(String::new, |line| format!("line {line}: "));
+        write!(formatter, "{line}the log has {}, the replay {}", self.logged, self.replayed)
     }
 }
 
@@ -160,10 +157,7 @@ fn replay_stretch(stretch: &Stretch, replayed: &mut Replayed, advance: &mut impl
         ));
     }
 
-    let mut played = Vec::new();
-    for pace in Pace::ALL {
-        played.push(play(stretch, pace, advance)?);
-    }
+    let played = Pace::ALL.into_iter().map(|pace| play(stretch, pace, advance)).collect::<Result<Vec<_>, _>>()?;
     let heard: Vec<&[Heard]> = played.iter().map(|played| played.replayed.as_slice()).collect();
     // The logged values are the same at every pace.
     let Played { logged, notes, end, .. } = &played[0];
@@ -212,19 +206,19 @@ fn play(stretch: &Stretch, pace: Pace, advance: &mut impl FnMut()) -> Result<Pla
                 }
                 logged.push(Heard { line: entry.number, steps: 0, event: *event, speed: player.speed(), is_given });
             }
-            Happened::Refused => {}
-            Happened::Command(line) => {
+            Happened::Command(None) => {}
+            Happened::Command(Some(command)) => {
                 // The status that shows the new state must come nearer to the command.
                 if stretch.is_reported_by_event(place) {
-                    starts_now |= link::command(line).is_ok_and(|command| command.action == Action::StartNow);
+                    starts_now |= command.action == Action::StartNow;
                     continue;
                 }
                 if let Some(at) = stretch.position_of_command((player.position(), last_ms), place) {
                     player.roll_to(at, stretch.next_status(place));
                     last_ms = entry.time_ms;
                 }
-                if !player.command(line) {
-                    notes.push(format!("line {}: not replayed from `{}` on", entry.number, line));
+                if !player.command(command) {
+                    notes.push(format!("line {}: not replayed from `{}` on", entry.number, entry.text));
                     break;
                 }
             }
@@ -238,16 +232,17 @@ fn play(stretch: &Stretch, pace: Pace, advance: &mut impl FnMut()) -> Result<Pla
 mod tests {
     use super::*;
 
-    /// The log of a machine that rolls at half a metre a second over bare ground. At each status, ten times a second,
-    /// `happens` adds typed lines, answers or events.
-    fn log(statuses: u64, happens: impl Fn(u64) -> Vec<(Kind, &'static str)>) -> Vec<Entry> {
+    /// The log of a machine that rolls at half a metre a second over bare ground, with a status ten times a second. These
+    /// typed lines, answers and events come after the status of their number.
+    fn log(happens: &[(u64, Kind, &str)]) -> Vec<Entry> {
         let mut lines = vec![(0, Kind::Connected, "0.2.0".to_owned())];
-        for status in 0..statuses {
+        for status in 0..20 {
             let (time_ms, position) = (100 * status, status as i64 * 95);
             let unseen_mm = 450_u64.saturating_sub(50 * status);
             let line = format!("state=hold tool=out pos={position} speed_mm_s=500 windows=0 unseen_mm={unseen_mm}");
             lines.push((time_ms, Kind::Status, line));
-            lines.extend(happens(status).into_iter().map(|(kind, line)| (time_ms + 1, kind, line.to_owned())));
+            let here = happens.iter().filter(|(number, ..)| *number == status);
+            lines.extend(here.map(|&(_, kind, line)| (time_ms + 1, kind, line.to_owned())));
         }
         let entry = |(place, (time_ms, kind, text))| Entry { number: place as u64 + 2, time_ms, kind, text };
         lines.into_iter().enumerate().map(entry).collect()
@@ -256,37 +251,33 @@ mod tests {
     #[test]
     fn a_command_that_the_firmware_refused_is_not_carried_out() {
         let refused = "error: an alarm is latched, look after it and clear it first";
-        let start = |end: &'static str| vec![(Kind::Command, "start"), (Kind::Answer, end)];
-        let never = log(20, |status| if status == 2 { start(refused) } else { Vec::new() });
-        let replayed = replay(&never).unwrap();
+        let start = |end| replay(&log(&[(2, Kind::Command, "start"), (2, Kind::Answer, end)])).unwrap();
+        let replayed = start(refused);
         assert_eq!((replayed.difference, replayed.swings), (None, 0));
 
         // If the same start was accepted, the tool swings into the row.
-        let taken = log(20, |status| if status == 2 { start("ok") } else { Vec::new() });
-        let difference = replay(&taken).unwrap().difference.expect("the log has no swing");
+        let difference = start("ok").difference.expect("the log has no swing");
         assert!(difference.replayed.contains("swing tool=in"), "{difference}");
     }
 
     #[test]
     fn where_a_second_beam_sees_more_than_the_log_holds_nothing_is_replayed() {
-        let set = |status| {
-            if status == 2 { vec![(Kind::Command, "set second_beam_mm 200"), (Kind::Answer, "ok")] } else { Vec::new() }
-        };
-        assert_eq!(replay(&log(20, set)).unwrap().notes, ["line 6: not replayed from `set second_beam_mm 200` on"]);
+        let set = log(&[(2, Kind::Command, "set second_beam_mm 200"), (2, Kind::Answer, "ok")]);
+        assert_eq!(replay(&set).unwrap().notes, ["line 6: not replayed from `set second_beam_mm 200` on"]);
         let setting = "second_beam_mm=200 mm from 0 to 900, default 0, saved 0";
-        let mut has_one = log(20, |_| Vec::new());
+        let mut has_one = log(&[]);
         has_one.insert(1, Entry { number: 2, time_ms: 0, kind: Kind::Setting, text: setting.to_owned() });
         assert_eq!(replay(&has_one).unwrap().notes.len(), 1);
     }
 
     #[test]
     fn events_and_settings_that_only_a_newer_version_knows_are_left_out_and_named() {
-        let newer = |status| match status {
-            2 => vec![(Kind::Event, "tilt deg=4 pos=9"), (Kind::Event, "alarm code=9-1 name=boredom pos=9")],
-            3 => vec![(Kind::Event, "tilt deg=5 pos=9"), (Kind::Example, "tilt deg=5")],
-            _ => Vec::new(),
-        };
-        let mut entries = log(20, newer);
+        let mut entries = log(&[
+            (2, Kind::Event, "tilt deg=4 pos=9"),
+            (2, Kind::Event, "alarm code=9-1 name=boredom pos=9"),
+            (3, Kind::Event, "tilt deg=5 pos=9"),
+            (3, Kind::Example, "tilt deg=5"),
+        ]);
         entries.insert(1, Entry { number: 2, time_ms: 0, kind: Kind::Setting, text: "tilt_deg=7".to_owned() });
         let replayed = replay(&entries).unwrap();
         assert_eq!(replayed.difference, None);
@@ -303,19 +294,19 @@ mod tests {
         for (line, notes) in
             [("TEST row 500", vec!["line 6: not replayed from `TEST row 500` on"]), ("test \u{1b}[2J", vec![])]
         {
-            let typed = |status| if status == 2 { vec![(Kind::Command, line)] } else { Vec::new() };
-            assert_eq!(replay(&log(20, typed)).unwrap().notes, notes);
+            assert_eq!(replay(&log(&[(2, Kind::Command, line)])).unwrap().notes, notes);
         }
     }
 
     #[test]
     fn answers_belong_to_commands_in_their_order() {
         // `hold` does not wait for the previous answer.
-        let log = log(20, |status| match status {
-            2 => vec![(Kind::Command, "set margin_mm 9999"), (Kind::Command, "start")],
-            3 => vec![(Kind::Answer, "error: margin_mm takes a whole number from 0 to 200"), (Kind::Answer, "ok")],
-            _ => Vec::new(),
-        });
+        let log = log(&[
+            (2, Kind::Command, "set margin_mm 9999"),
+            (2, Kind::Command, "start"),
+            (3, Kind::Answer, "error: margin_mm takes a whole number from 0 to 200"),
+            (3, Kind::Answer, "ok"),
+        ]);
         let difference = replay(&log).unwrap().difference.expect("the start was taken");
         assert!(difference.replayed.contains("swing tool=in"), "{difference}");
     }

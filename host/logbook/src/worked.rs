@@ -12,7 +12,7 @@ use link::{EventLine, Mode};
 use std::ops::Range;
 
 /// A stretch of work.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Worked {
     /// Its lines in the log.
     pub lines: Range<u64>,
@@ -90,8 +90,7 @@ pub fn worked(log: &[Entry]) -> Vec<Worked> {
         match (mode == Some(Mode::Work), open.is_some()) {
             (true, false) => open = Some(Open::at(entry, now_mm)),
             (false, true) => {
-                let beam_to_tool_mm = follower.in_use().settings().get(Setting::BeamToToolMm).into();
-                stretches.extend(open.take().map(|open| open.end(&plants_mm, beam_to_tool_mm)));
+                stretches.extend(open.take().map(|open| open.end(&plants_mm, &follower)));
             }
             _ => {}
         }
@@ -99,8 +98,7 @@ pub fn worked(log: &[Entry]) -> Vec<Worked> {
             plants_mm.clear();
         }
     }
-    let beam_to_tool_mm = follower.in_use().settings().get(Setting::BeamToToolMm).into();
-    stretches.extend(open.map(|open| open.end(&plants_mm, beam_to_tool_mm)));
+    stretches.extend(open.map(|open| open.end(&plants_mm, &follower)));
     stretches
 }
 
@@ -109,10 +107,7 @@ impl Open {
         let worked = Worked {
             lines: entry.number..entry.number + 1,
             time_ms: entry.time_ms..entry.time_ms,
-            rolled_ms: 0,
-            distance_mm: None,
-            plants: None,
-            swings: 0,
+            ..Worked::default()
         };
         Self { worked, beam_mm: now_mm.map(|mm| mm..mm), goes_on: true }
     }
@@ -126,7 +121,8 @@ impl Open {
         }
     }
 
-    fn end(self, plants_mm: &[f64], beam_to_tool_mm: f64) -> Worked {
+    fn end(self, plants_mm: &[f64], follower: &Follower) -> Worked {
+        let beam_to_tool_mm = f64::from(follower.in_use().settings().get(Setting::BeamToToolMm));
         let beam_mm = self.beam_mm.filter(|_| self.goes_on);
         let passed = |ground_mm: &Range<f64>| {
             let tool_mm = ground_mm.start - beam_to_tool_mm..ground_mm.end - beam_to_tool_mm;
@@ -164,7 +160,6 @@ mod tests {
     fn a_stretch_has_its_time_distance_plants_and_swings_as_counted_by_hand() {
         let mut text = HEAD.to_owned();
         let mut line = |time_ms: u64, kind: &str, said: &str| {
-            let said = if said.contains(',') { format!("\"{said}\"") } else { said.to_owned() };
             writeln!(text, "{time_ms},{kind},{said}").expect("a string takes all");
         };
         let plant = |position| format!("plant pos={position} votes=3 spacing=500 delay=100 hold=300 actuation=400");

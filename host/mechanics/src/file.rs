@@ -47,12 +47,6 @@ mod tests {
     use super::*;
     use crate::unit::MM;
 
-    #[track_caller]
-    fn assert_refused(text: &str, line: usize, words: &str) {
-        let said = parse(Path::new("my.toml"), text).unwrap_err().to_string();
-        assert!(said.starts_with(&format!("my.toml, line {line}: ")) && said.contains(words), "{said}");
-    }
-
     #[test]
     fn omitted_values_are_the_papers() {
         let parse = |text| parse(Path::new("my.toml"), text).unwrap();
@@ -63,46 +57,34 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_key_is_refused_with_the_known_ones() {
-        assert_refused("[wheel]\nwidth = \"35 mm\"\ndiametre = \"400 mm\"", 3, "wheel.diametre: unknown field");
-        assert_refused("\n[whel]\n", 2, "whel: unknown field `whel`, expected one of `weeder`");
-    }
-
-    #[test]
-    fn a_wrong_unit_is_refused_with_the_right_ones() {
+    fn a_wrong_file_is_refused_with_its_line_its_key_and_what_would_be_right() {
         let right = "wheel.diameter: \"0.4 kg\" is not a length: write a number and mm, cm or m, in quotes; \
                      the paper's machine has diameter = \"400 mm\"";
-        assert_refused("[wheel]\ndiameter = \"0.4 kg\"", 2, right);
-        assert_refused("wheel.diameter = \"0.4 kg\"", 1, right);
-        assert_refused("wheel = { width = \"35 mm\", diameter = \"0.4 kg\" }", 1, right);
-    }
-
-    #[test]
-    fn an_error_between_the_keys_of_another_section_is_found() {
         let scattered = "wheel.width = \"35 mm\"\nsoil.depth = \"2 kg\"\nwheel.diameter = \"400 mm\"";
-        assert_refused(scattered, 2, "soil.depth: \"2 kg\" is not a length");
-    }
-
-    #[test]
-    fn a_number_without_its_unit_is_refused() {
-        assert_refused("[wheel]\ndiameter = 400", 2, "wheel.diameter: 400 is not a length: write a number and mm");
-        assert_refused("[engine]\nsafety_factor = \"2 N\"", 2, "write one without quotes and unit");
-        assert_refused("[chain]\ndrive_teeth = 14.5", 2, "14.5 is not a whole number");
-        assert_refused("[inter_row]\ntools = -1", 2, "-1 is not a whole number from 0");
-    }
-
-    #[test]
-    fn values_that_do_not_go_together_are_refused() {
-        assert_refused("[crop]\nrow_spacing = \"100 mm\"", 2, "leaves no room for a sweep");
         let thick = "[wheel]\ndiameter = \"80 mm\"\nrim_thickness = \"40 mm\"";
-        assert_refused(thick, 3, "it has to be less than half of wheel.diameter, 80 mm");
+        for (text, line, words) in [
+            ("[wheel]\nwidth = \"35 mm\"\ndiametre = \"400 mm\"", 3, "wheel.diametre: unknown field"),
+            ("\n[whel]\n", 2, "whel: unknown field `whel`, expected one of `weeder`"),
+            ("[wheel]\ndiameter = \"0.4 kg\"", 2, right),
+            ("wheel.diameter = \"0.4 kg\"", 1, right),
+            ("wheel = { width = \"35 mm\", diameter = \"0.4 kg\" }", 1, right),
+            // Between the keys of another section.
+            (scattered, 2, "soil.depth: \"2 kg\" is not a length"),
+            ("[wheel]\ndiameter = 400", 2, "wheel.diameter: 400 is not a length: write a number and mm"),
+            ("[engine]\nsafety_factor = \"2 N\"", 2, "write one without quotes and unit"),
+            ("[chain]\ndrive_teeth = 14.5", 2, "14.5 is not a whole number"),
+            ("[inter_row]\ntools = -1", 2, "-1 is not a whole number from 0"),
+            // Values that do not go together.
+            ("[crop]\nrow_spacing = \"100 mm\"", 2, "leaves no room for a sweep"),
+            (thick, 3, "it has to be less than half of wheel.diameter, 80 mm"),
+            // No TOML.
+            ("[wheel]\ndiameter = 400 mm", 2, ""),
+            ("wheel = 5", 1, "expected a section"),
+        ] {
+            let said = parse(Path::new("my.toml"), text).unwrap_err().to_string();
+            assert!(said.starts_with(&format!("my.toml, line {line}: ")) && said.contains(words), "{said}");
+        }
         let elsewhere = parse(Path::new("my.toml"), "[crop]\nprotection_zone = \"140 mm\"").unwrap_err().to_string();
         assert!(elsewhere.starts_with("my.toml: crop.row_spacing leaves no room"), "{elsewhere}");
-    }
-
-    #[test]
-    fn invalid_toml_is_refused_with_its_line() {
-        assert_refused("[wheel]\ndiameter = 400 mm", 2, "");
-        assert_refused("wheel = 5", 1, "expected a section");
     }
 }

@@ -6,9 +6,7 @@
 
 use crate::equations as eq;
 use crate::figure::digits;
-use crate::unit::{
-    COUNT, DEGREE, FACTOR, HP, KG, KG_CM, KM_H, KPA, MM, MPA, PERCENT, RPM, SECOND, Unit, Written, read,
-};
+use crate::unit::{COUNT, DEGREE, FACTOR, HP, KG, KG_CM, KM_H, KPA, MM, MPA, PERCENT, RPM, SECOND, read};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 use thiserror::Error;
@@ -34,10 +32,6 @@ pub struct Input {
 }
 
 impl Input {
-    fn new<Q: Written>(section: &'static str, quantity: Q, unit: Unit<Q>, least: f64, most: f64) -> Self {
-        Self { section, key: "", about: "", value: unit.value(quantity), unit: unit.name, least, most }
-    }
-
     /// The value as written in a machine file.
     pub fn written(&self) -> String {
         // The conversion of units leaves an error in the last digits. A value far out of range would show too many
@@ -108,9 +102,13 @@ macro_rules! sections {
             pub fn inputs(&self) -> Vec<Input> {
                 vec![$($(
                     Input {
+                        section: stringify!($section),
                         key: stringify!($key),
                         about: concat!($($about),+),
-                        ..Input::new(stringify!($section), self.$section.$key, $unit, $least as f64, $most as f64)
+                        value: $unit.value(self.$section.$key),
+                        unit: $unit.name,
+                        least: $least,
+                        most: $most,
                     },
                 )+)+]
             }

@@ -56,65 +56,43 @@ pub struct Comparison {
 /// Allowed relative deviation of a printed figure, if intermediate results were rounded.
 const ROUNDING: f64 = 0.005;
 
-impl Verdict {
-    /// Compares a figure with the result of its equation, from the machine alone and from the printed inputs. A figure
-    /// is right if it is exact to half of its last digit, or off by less than half a percent.
-    fn of(printed: f64, decimals: usize, calculated: f64, from_printed_inputs: f64) -> Self {
-        let half_digit = 0.5 * 10_f64.powi(-(decimals as i32));
-        let is = |value: f64| (printed - value).abs() <= half_digit.max(ROUNDING * value.abs());
-        match () {
-            () if is(calculated) => Self::Right,
-            () if is(from_printed_inputs) => Self::Follows,
-            () => Self::Wrong,
-        }
-    }
-}
-
 /// The paper's machine, and the user's own.
 struct Designs {
     paper: Design,
     own: Option<Design>,
 }
 
-/// A printed figure, with the results of both designs.
-struct Figure<Q> {
-    name: &'static str,
-    equation: &'static str,
-    printed: &'static str,
-    unit: Unit<Q>,
-    calculated: Q,
-    own: Option<Q>,
-}
+/// A figure's name, equation and printed value, and its value in both designs.
+struct Figure<Q>((&'static str, &'static str, &'static str), Unit<Q>, Q, Option<Q>);
 
 impl Designs {
     fn figure<Q>(
         &self,
-        (name, equation, printed): (&'static str, &'static str, &'static str),
+        printed: (&'static str, &'static str, &'static str),
         unit: Unit<Q>,
         result: fn(&Design) -> Q,
     ) -> Figure<Q> {
-        Figure { name, equation, printed, unit, calculated: result(&self.paper), own: self.own.as_ref().map(result) }
+        Figure(printed, unit, result(&self.paper), self.own.as_ref().map(result))
     }
 }
 
 impl<Q> Figure<Q> {
-    /// The comparison with the result of the equation for the printed inputs.
+    /// The comparison with the result of the equation for the printed inputs. The printed figure is right if it is exact
+    /// to half of its last digit, or off by less than half a percent.
     fn from(self, printed_inputs: Q, remark: impl Into<String>) -> Comparison {
-        let decimals = self.printed.split_once('.').map_or(0, |(_, decimals)| decimals.len());
-        let printed = self.printed.parse().unwrap_or(f64::NAN);
-        let [from_printed_inputs, calculated] = [printed_inputs, self.calculated].map(|value| self.unit.value(value));
-        Comparison {
-            name: self.name,
-            equation: self.equation,
-            unit: self.unit.name,
-            printed,
-            decimals,
-            from_printed_inputs,
-            calculated,
-            own: self.own.map(|own| self.unit.value(own)),
-            verdict: Verdict::of(printed, decimals, calculated, from_printed_inputs),
-            remark: remark.into(),
-        }
+        let Self((name, equation, printed), unit, calculated, own) = self;
+        let decimals = printed.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+        let printed: f64 = printed.parse().unwrap_or(f64::NAN);
+        let [from_printed_inputs, calculated] = [printed_inputs, calculated].map(|value| unit.value(value));
+        let half_digit = 0.5 * 10_f64.powi(-(decimals as i32));
+        let is = |value: f64| (printed - value).abs() <= half_digit.max(ROUNDING * value.abs());
+        let verdict = match (is(calculated), is(from_printed_inputs)) {
+            (true, _) => Verdict::Right,
+            (false, true) => Verdict::Follows,
+            (false, false) => Verdict::Wrong,
+        };
+        let (unit, own, remark) = (unit.name, own.map(|own| unit.value(own)), remark.into());
+        Comparison { name, equation, unit, printed, decimals, from_printed_inputs, calculated, own, verdict, remark }
     }
 }
 
@@ -153,12 +131,9 @@ pub fn compare(own_machine: Option<&Machine>) -> Result<Vec<Comparison>, Machine
     let thin = written(shear(1.5), KPA);
     // The default machine has the sheet of Table 1, so both columns start from the diameters of the text.
     let thickness = (outer - inner) / 2.0;
-    let thickness = Figure {
-        calculated: thickness,
-        own: own_machine.map(|own| own.wheel.rim_thickness),
-        ..both.figure(("wheel thickness", "below Eq. 20", "3"), MM, |_| MM.of(3.0))
-    }
-    .from(thickness, "0.400 and 0.397 m were subtracted, not halved; the sheet of Table 1 has 3 mm");
+    let printed = ("wheel thickness", "below Eq. 20", "3");
+    let thickness = Figure(printed, MM, thickness, own_machine.map(|own| own.wheel.rim_thickness))
+        .from(thickness, "0.400 and 0.397 m were subtracted, not halved; the sheet of Table 1 has 3 mm");
 
     let (speed, width) = (KM_H.of(2.5), M.of(0.4));
     let capacity = format!(

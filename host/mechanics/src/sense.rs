@@ -25,26 +25,23 @@ const SOFT_WHEEL_NUMERIC: f64 = 15.0;
 const TILLED_WHEEL_NUMERIC: f64 = 25.0;
 
 /// A line of interpretation, and whether it asks for a change.
-struct Sense {
-    words: String,
-    concern: bool,
-}
+type Sense = (String, bool);
 
 /// All is well.
 fn fine(words: String) -> Sense {
-    Sense { words, concern: false }
+    (words, false)
 }
 
 /// The machine should be changed.
 fn concern(words: String) -> Sense {
-    Sense { words, concern: true }
+    (words, true)
 }
 
 /// Makes the figures of a design, each from the field of its key: `key: name, equation, unit => sense`.
 macro_rules! figures {
     ($design:ident; $($key:ident: $name:literal, $equation:literal, $unit:ident => $sense:expr;)+) => {
         vec![$({
-            let Sense { words: sense, concern } = $sense;
+            let (sense, concern) = $sense;
             let (key, value) = (stringify!($key), $unit.value($design.$key));
             Figure { key, name: $name, equation: $equation, value, unit: $unit.name, sense, concern }
         }),+]
@@ -77,14 +74,12 @@ impl Design {
         let soil_part = Ratio::from((coefficient - WHEELS_OWN_RESISTANCE) / coefficient);
         let part = |force: Force| fine(format!("{} of the tractive force", percent(force / self.tractive_force)));
         let pull = self.tractive_force / self.weight;
+        let (share, limit) = (percent(pull), TYRE_TRACTION_LIMIT * 100.0);
         let grip = if f64::from(pull) > TYRE_TRACTION_LIMIT {
-            concern(format!(
-                "{} of the weight; a tyre slips above {:.0} %: it needs pegs, less depth or more mass",
-                percent(pull),
-                TYRE_TRACTION_LIMIT * 100.0
-            ))
+            let remedy = "it needs pegs, less depth or more mass";
+            concern(format!("{share} of the weight; a tyre slips above {limit:.0} %: {remedy}"))
         } else {
-            fine(format!("{} of the weight: wheels can pull that", percent(pull)))
+            fine(format!("{share} of the weight: wheels can pull that"))
         };
         let steady = written(self.power / machine.engine.safety_factor, WATT);
         figures! { self;
@@ -103,30 +98,21 @@ impl Design {
 
     fn engine(&self, machine: &Machine) -> Sense {
         let ratio = f64::from(machine.engine.power / self.engine_power);
-        let given = written(machine.engine.power, HP);
-        if ratio < 1.0 {
-            concern(format!(
-                "the engine's {given} are only {} of that: too small",
-                written(ratio.into(), unit::PERCENT)
-            ))
-        } else if ratio >= ENGINE_EXCESS {
-            concern(format!("the engine's {given} are {ratio:.2} times that: too large"))
-        } else {
-            fine(format!("the engine's {given} are {ratio:.2} times that: large enough"))
+        let (given, share) = (written(machine.engine.power, HP), written(ratio.into(), unit::PERCENT));
+        match ratio {
+            ..1.0 => concern(format!("the engine's {given} are only {share} of that: too small")),
+            ENGINE_EXCESS.. => concern(format!("the engine's {given} are {ratio:.2} times that: too large")),
+            _ => fine(format!("the engine's {given} are {ratio:.2} times that: large enough")),
         }
     }
 
     fn tools(&self, machine: &Machine) -> Vec<Figure> {
         let servo = machine.intra_row.servo_torque;
         let ratio = f64::from(servo / self.servo_torque);
-        let servo_sense = if ratio < 1.0 {
-            concern(format!(
-                "the servo's {} are {} of that: too weak",
-                written(servo, KG_CM),
-                written(ratio.into(), unit::PERCENT)
-            ))
-        } else {
-            fine(format!("the servo's {} are {ratio:.2} times that: strong enough", written(servo, KG_CM)))
+        let (given, share) = (written(servo, KG_CM), written(ratio.into(), unit::PERCENT));
+        let servo_sense = match ratio {
+            ..1.0 => concern(format!("the servo's {given} are {share} of that: too weak")),
+            _ => fine(format!("the servo's {given} are {ratio:.2} times that: strong enough")),
         };
         let at_depth = self.servo_torque_at_depth;
         let depth = written(machine.soil.depth, MM);
@@ -180,12 +166,12 @@ impl Design {
             let stress = bending_stress(moment, diameter);
             let (given, ratio) = (written(diameter, MM), f64::from(stress / shank.allowed_stress));
             let stress = written(stress, MPA);
-            if ratio > 1.0 {
-                concern(format!(
+            let share = percent(ratio.into());
+            match ratio {
+                ..=1.0 => fine(format!("the shank's {given} bear {stress}, {share} of the allowed stress")),
+                _ => concern(format!(
                     "the shank's {given} would bear {stress}, {ratio:.1} times the allowed stress: it bends"
-                ))
-            } else {
-                fine(format!("the shank's {given} bear {stress}, {} of the allowed stress", percent(ratio.into())))
+                )),
             }
         };
         figures! { self;
@@ -233,10 +219,10 @@ impl Design {
     fn wheel_and_handle(&self, machine: &Machine) -> Vec<Figure> {
         let strength = machine.wheel.shear_strength;
         let ratio = f64::from(strength / self.shear_stress);
-        let safe = if ratio < 1.0 {
-            concern(format!("more than the steel's {}: the wheel fails", written(strength, MPA)))
-        } else {
-            fine(format!("the steel's {} are {} times that: the wheel is safe", written(strength, MPA), digits(ratio)))
+        let (given, times) = (written(strength, MPA), digits(ratio));
+        let safe = match ratio {
+            ..1.0 => concern(format!("more than the steel's {given}: the wheel fails")),
+            _ => fine(format!("the steel's {given} are {times} times that: the wheel is safe")),
         };
         let rim = written(machine.wheel.rim_thickness, MM);
         let rim_sense = if machine.wheel.rim_thickness < self.least_rim_thickness {

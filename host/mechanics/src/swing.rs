@@ -15,7 +15,7 @@ use crate::unit::{KG_CM, MM};
 use link::settings::Setting;
 use serde::Serialize;
 use set_up::{circle, saved_ms};
-use uom::si::f64::Torque;
+use uom::si::f64::{Time, Torque};
 use uom::si::time::second;
 
 /// The most that a pulse and the gap after it delay a command, ms.
@@ -88,30 +88,23 @@ impl Swing {
         let angle_degrees = stroke_us / us_a_degree;
         let unloaded_ms = 1000.0 * inputs.servo_time_60.get::<second>() * angle_degrees / 60.0;
         let loaded_ms = unloaded_ms / (1.0 - load);
-        let dead_ms = |time: uom::si::f64::Time| 1000.0 * time.get::<second>();
+        let dead_ms = |time: Time| 1000.0 * time.get::<second>();
         let from_mm = MM.value(inputs.sweep_from);
         let lead_out_ms = dead_ms(inputs.most_dead_time.max(inputs.least_dead_time)) + loaded_ms + PULSE_AND_GAP_MS;
         let protected_mm = MM.value(inputs.protected);
         let stem_zone_mm = if protected_mm > 0.0 { protected_mm + MM.value(inputs.stem_off) } else { 0.0 };
         let top_speed_mm_s = f64::from(Setting::TopSpeedMmS.description().default);
         let aside_of_stroke_mm = arm_mm * angle_degrees.to_radians().sin();
-        let [saved_out_ms, saved_in_ms] = match stem_zone_mm > 0.0 {
-            true => saved_ms(top_speed_mm_s, unloaded_ms, stem_zone_mm, aside_of_stroke_mm).map(f64::from),
-            false => [0.0, 0.0],
-        };
-        let carried_mm = arm_mm * (1.0 - angle_degrees.to_radians().cos());
-        let (arm_margin_mm, lift_mm) = match (inputs.arm_trails > 0, stem_zone_mm > 0.0) {
-            (false, _) => (0.0, carried_mm),
-            (true, true) => (
-                {
-                    let rolled_mm = circle::rolled_mm(top_speed_mm_s, unloaded_ms, stem_zone_mm, aside_of_stroke_mm);
-                    circle::carried_mm(arm_mm, tool_mm, stem_zone_mm, rolled_mm)
-                },
-                0.0,
-            ),
-            // Over a whole canopy the tool is fully out.
-            (true, false) => (carried_mm, 0.0),
-        };
+        let stroke_mm = arm_mm * (1.0 - angle_degrees.to_radians().cos());
+        // Over a whole canopy the tool is fully out.
+        let (mut saved, mut carried_mm) = ([0.0; 2], stroke_mm);
+        if stem_zone_mm > 0.0 {
+            saved = saved_ms(top_speed_mm_s, unloaded_ms, stem_zone_mm, aside_of_stroke_mm).map(f64::from);
+            let rolled_mm = circle::rolled_mm(top_speed_mm_s, unloaded_ms, stem_zone_mm, aside_of_stroke_mm);
+            carried_mm = circle::carried_mm(arm_mm, tool_mm, stem_zone_mm, rolled_mm);
+        }
+        let [saved_out_ms, saved_in_ms] = saved;
+        let (arm_margin_mm, lift_mm) = if inputs.arm_trails > 0 { (carried_mm, 0.0) } else { (0.0, stroke_mm) };
         Ok(Self {
             stem_zone_mm: stem_zone_mm.ceil() as u32,
             angle_degrees,

@@ -87,12 +87,10 @@ impl Written for Mass {
 
 /// Second.
 pub const SECOND: Unit<Time> = unit("s", Time::new::<second>, Time::get::<second>);
-/// Millisecond.
-pub const MS: Unit<Time> = unit("ms", Time::new::<millisecond>, Time::get::<millisecond>);
 
 impl Written for Time {
     const KIND: &'static str = "a time";
-    const UNITS: &'static [Unit<Self>] = &[SECOND, MS];
+    const UNITS: &'static [Unit<Self>] = &[SECOND, unit("ms", Time::new::<millisecond>, Time::get::<millisecond>)];
 }
 
 /// Kilometre per hour.
@@ -209,27 +207,15 @@ fn no_quantity<Q: Written>(written: impl Display) -> String {
 /// # Errors
 /// If there is no number, or the unit is missing or of another kind of quantity; it says which units there are.
 pub fn parse<Q: Written>(text: &str) -> Result<Q, String> {
-    let error = || no_quantity::<Q>(format_args!("\"{text}\""));
-    let (number, name) = text.split_at(number_end(text));
-    let number: f64 = number.trim().parse().map_err(|_| error())?;
-    let unit = Q::UNITS.iter().find(|unit| !unit.name.is_empty() && closed_up(unit.name) == closed_up(name));
-    unit.map(|unit| unit.of(number)).ok_or_else(error)
-}
-
-/// The end of the number at the beginning of a text. An e belongs to it if an exponent follows.
-fn number_end(text: &str) -> usize {
-    let is_of_unit = |(_, c): &(usize, char)| c.is_alphabetic() || "%°".contains(*c);
-    let mut units = text.char_indices().filter(is_of_unit);
-    let is_exponent = |rest: &str| {
-        let digits = rest.get(1..).unwrap_or_default();
-        rest.starts_with(['e', 'E']) && digits.trim_start_matches(['+', '-']).starts_with(|c: char| c.is_ascii_digit())
+    let closed_up = |name: &str| name.replace(|c: char| c.is_whitespace() || c == '·', "");
+    // A number ends where a unit begins. An e is then an exponent's.
+    let split = |(at, _)| {
+        let (number, name) = text.split_at(at);
+        let unit = Q::UNITS.iter().find(|unit| !unit.name.is_empty() && closed_up(unit.name) == closed_up(name))?;
+        Some((number.trim().parse().ok().filter(|number: &f64| number.is_finite())?, unit))
     };
-    let end = units.find(|&(place, _)| !is_exponent(&text[place..]));
-    end.map_or(text.len(), |(place, _)| place)
-}
-
-fn closed_up(name: &str) -> String {
-    name.chars().filter(|c| !c.is_whitespace() && *c != '·').collect()
+    let read = text.char_indices().find_map(split).map(|(number, unit)| unit.of(number));
+    read.ok_or_else(|| no_quantity::<Q>(format_args!("\"{text}\"")))
 }
 
 /// Reads a quantity as a string with its unit, and a plain number as such; for serde's `deserialize_with`.

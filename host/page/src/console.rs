@@ -38,17 +38,11 @@ pub fn read(line: &str) -> Value {
 
 /// Converts a Rust name of a field or variant to TypeScript's form.
 fn camel_case(name: &str) -> String {
-    let mut camel = String::new();
-    let mut begins = false;
-    for character in name.chars() {
-        match character {
-            '_' => begins = true,
-            _ if camel.is_empty() => camel.push(character.to_ascii_lowercase()),
-            _ if std::mem::take(&mut begins) => camel.push(character.to_ascii_uppercase()),
-            _ => camel.push(character),
-        }
-    }
-    camel
+    let word = |(number, word): (usize, &str)| {
+        let (first, rest) = word.split_at(1);
+        if number == 0 { first.to_ascii_lowercase() + rest } else { first.to_ascii_uppercase() + rest }
+    };
+    name.split('_').enumerate().map(word).collect()
 }
 
 /// The firmware of these sources: its version, and its settings' names. A release's version includes the commit

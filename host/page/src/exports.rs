@@ -1,16 +1,14 @@
 //! The interface of the WebAssembly module: one buffer for questions and answers.
 //!
 //! `room` makes room for a question and returns its address. `answer` answers the question in the buffer and returns
-//! the answer's address. `read` takes the buffer as the next bytes of a log instead. `roll` and `hear` call the rolling
-//! machine. `table` returns the address of a table. `length` returns the length of the last answer or table. Each
-//! address is valid until the next call. During a long answer the module calls `progress`, which the page provides. No
-//! binding generator is used.
+//! the answer's address. `length` returns the answer's length. `read` takes the buffer as the next bytes of a log
+//! instead. Each address is valid until the next call. During a long answer the module calls `progress`, which the page
+//! provides. No binding generator is used.
 
-use std::cell::{Cell, RefCell};
+use std::cell::RefCell;
 
 thread_local! {
     static BUFFER: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
-    static LENGTH: Cell<usize> = const { Cell::new(0) };
 }
 
 #[link(wasm_import_module = "page")]
@@ -40,41 +38,17 @@ extern "C" fn room(length: usize) -> *mut u8 {
 extern "C" fn answer() -> *const u8 {
     let question = BUFFER.take();
     BUFFER.replace(crate::answer(&question).into_bytes());
-    BUFFER.with_borrow(|answer| {
-        LENGTH.set(answer.len());
-        answer.as_ptr()
-    })
+    BUFFER.with_borrow(Vec::as_ptr)
 }
 
 // SAFETY: as above.
 #[unsafe(no_mangle)]
 extern "C" fn length() -> usize {
-    LENGTH.get()
+    BUFFER.with_borrow(Vec::len)
 }
 
 // SAFETY: as above.
 #[unsafe(no_mangle)]
 extern "C" fn read() {
     crate::record::take(&BUFFER.take());
-}
-
-// SAFETY: as above.
-#[unsafe(no_mangle)]
-extern "C" fn table(number: usize) -> *const f64 {
-    crate::table(number, |values| {
-        LENGTH.set(values.len());
-        values.as_ptr()
-    })
-}
-
-// SAFETY: as above.
-#[unsafe(no_mangle)]
-extern "C" fn roll(cycle: f64) {
-    crate::roll(cycle);
-}
-
-// SAFETY: as above.
-#[unsafe(no_mangle)]
-extern "C" fn hear(rise: f64, fall: f64) {
-    crate::hear(rise, fall);
 }

@@ -16,22 +16,21 @@ mod simulation;
 #[cfg(target_arch = "wasm32")]
 use exports::progress;
 pub use record::take;
-pub use simulation::{hear, roll};
 
 use serde::Deserialize;
 use serde_json::{Value, json};
-use std::cell::RefCell;
+use simulation::{Simulation, with};
 
 /// A question, as an object with one key.
 #[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
+#[serde(rename_all = "camelCase", rename_all_fields = "camelCase")]
 enum Question {
     /// What does this line of the console say?
     Read(String),
     /// Begin a session over an open wire. True if opening it has reset the Uno.
     Open(bool),
     /// What does this session answer?
-    Session(session::Request),
+    Session { session: usize, what: session::What },
     /// Which values change these settings to those?
     Steps(console::Change),
     /// What is the next step of setting up this machine?
@@ -40,8 +39,15 @@ enum Question {
     Begin(simulation::Begun),
     /// Change this on the way.
     Change(simulation::Different),
-    /// What is the result for the plants and tall weeds behind the tool?
-    Judge(simulation::Kept),
+    /// Roll on until this cycle of the Uno's clock. How do the pins change until then?
+    Roll(f64),
+    /// The Uno has sent its servo a pulse, by the cycles of its edges.
+    Hear(f64, f64),
+    /// What does the machine do now?
+    Look,
+    /// What is the result for the plants and tall weeds behind the tool, by the firmware's margin on both sides of a
+    /// plant, and its stem zone? The zone is 0 for whole canopies.
+    Judge { margin_mm: u32, stem_zone_mm: u32 },
     /// Begin a log. True keeps all its lines.
     Log(bool),
     /// What does the log show?
@@ -60,32 +66,23 @@ enum Question {
 #[cfg(not(target_arch = "wasm32"))]
 fn progress(_share: f64) {}
 
-thread_local! {
-    /// What the log's picture shows, or what the rolling machine does, by the numbers in `record` and `simulation`.
-    static TABLES: RefCell<[Vec<f64>; 3]> = const { RefCell::new([const { Vec::new() }; 3]) };
-}
-
-/// A table, valid until it is replaced. Empty if there is no such table.
-pub fn table<Read>(number: usize, read: impl FnOnce(&[f64]) -> Read) -> Read {
-    TABLES.with_borrow(|tables| read(tables.get(number).map_or(&[], Vec::as_slice)))
-}
-
-fn put(number: usize, table: Vec<f64>) {
-    TABLES.with_borrow_mut(|tables| tables[number] = table);
-}
-
 /// Answers a question: `{"answer": ...}`, or `{"error": "..."}` if the question is invalid.
 pub fn answer(question: &[u8]) -> String {
     let answer =
         serde_json::from_slice(question).map_err(|error| error.to_string()).and_then(|question| match question {
             Question::Read(line) => Ok(console::read(&line)),
             Question::Open(resets) => Ok(session::open(resets)),
-            Question::Session(request) => request.take(),
+            Question::Session { session, what } => session::take(session, what),
             Question::Steps(change) => Ok(change.steps()),
             Question::SetUp(heard) => Ok(heard.advice()),
             Question::Begin(begun) => Ok(begun.begin()),
-            Question::Change(different) => different.take(),
-            Question::Judge(kept) => kept.judge(),
+            Question::Change(different) => with(|simulation| simulation.change(different)),
+            Question::Roll(cycle) => with(|simulation| simulation.roll(cycle)),
+            Question::Hear(rise, fall) => with(|simulation| simulation.hear(rise, fall)),
+            Question::Look => with(Simulation::look),
+            Question::Judge { margin_mm, stem_zone_mm } => {
+                with(|simulation| json!(simulation.judge(margin_mm, stem_zone_mm)))
+            }
             Question::Log(is_whole) => Ok(record::begin(is_whole)),
             Question::Picture => Ok(record::picture()),
             Question::Replay => Ok(record::replayed(progress)),

@@ -1,7 +1,7 @@
 //! A log for the page: the row that the machine has reported, drawn on the ground, and its replay.
 //!
 //! A day's log is 100 MB, so it is read in pieces: [`begin`], then [`take`] for each piece, and then a question about
-//! it. [`picture`] needs each line once, so no line is kept for it. The page reads its tables in place (`exports`).
+//! it. [`picture`] needs each line once, so no line is kept for it.
 //!
 //! Distances are millimetres of the tool's travel since the start of the log, by the wheel. After a reset, or for
 //! another machine, the ground continues one metre farther. An event without a position has that of the line before.
@@ -242,16 +242,15 @@ fn ended(answer: impl FnOnce(&mut Log) -> Result<Value, String>) -> Value {
     })
 }
 
-/// The picture without its tables, or the error.
+/// The picture, or the error.
 pub fn picture() -> Value {
     ended(|log| {
         log.picture.worked();
         let Picture { end_mm, unknown_ms, time_ms, swings, has_places, alarms, tables, .. } =
             std::mem::take(&mut log.picture);
-        tables.into_iter().enumerate().for_each(|(number, table)| crate::put(number, table));
         Ok(json!({
             "lengthMm": end_mm, "timeMs": time_ms, "swings": swings, "alarms": alarms, "hasPlaces": has_places,
-            "unknownMs": unknown_ms,
+            "unknownMs": unknown_ms, "tables": tables,
         }))
     })
 }
@@ -290,7 +289,6 @@ pub fn map(words: &Words) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::table;
 
     const LOG: &str = "time_ms,kind,line
 0,connected,0.2.0
@@ -330,8 +328,9 @@ mod tests {
         picture()
     }
 
-    fn rows<const COLUMNS: usize>(number: usize) -> Vec<[f64; COLUMNS]> {
-        table(number, |values| values.chunks(COLUMNS).map(|row| row.try_into().unwrap()).collect())
+    fn rows<const COLUMNS: usize>(picture: &Value, table: usize) -> Vec<[f64; COLUMNS]> {
+        let values: Vec<f64> = serde_json::from_value(picture["tables"][table].clone()).unwrap();
+        values.chunks(COLUMNS).map(|row| row.try_into().unwrap()).collect()
     }
 
     #[test]
@@ -339,9 +338,9 @@ mod tests {
         for length in [1, 100, 10_000] {
             let picture = shown(LOG, length);
             // Half a millimetre a count; the log begins at 1000.
-            assert_eq!(rows(OBJECTS), [[0.0, 900.0, 1050.0, 840.0, 1110.0]]);
+            assert_eq!(rows(&picture, OBJECTS), [[0.0, 900.0, 1050.0, 840.0, 1110.0]]);
             assert_eq!(picture["swings"], 1);
-            assert_eq!(rows(WORKED), [[0.0, 800.0]]);
+            assert_eq!(rows(&picture, WORKED), [[0.0, 800.0]]);
             assert_eq!(
                 picture["alarms"],
                 json!([
@@ -349,7 +348,7 @@ mod tests {
                     { "name": "no_plants", "mm": 850.0, "timeMs": 480, "isWarning": true },
                 ])
             );
-            let speeds = rows::<3>(SPEEDS);
+            let speeds = rows::<3>(&picture, SPEEDS);
             assert_eq!(speeds[..2], [[0.0, 10.0, 500.0], [850.0, 460.0, 500.0]]);
             // The zone lay ahead of the tool, and a metre lies between.
             assert!(speeds[2][0] >= 2000.0, "{speeds:?}");
@@ -384,7 +383,7 @@ mod tests {
             (command("revert", "\"error: no settings are saved, save does it\""), 1000.0),
         ] {
             let picture = shown(&changed(&lines), 64);
-            let positions: Vec<f64> = rows::<3>(SPEEDS).iter().map(|[mm, ..]| mm.round()).collect();
+            let positions: Vec<f64> = rows::<3>(&picture, SPEEDS).iter().map(|[mm, ..]| mm.round()).collect();
             assert_eq!(positions, [0.0, 500.0, f64::round(last_mm)], "{lines}");
             assert_eq!(picture["unknownMs"], json!([]), "{lines}");
         }
@@ -396,13 +395,14 @@ mod tests {
         let reverted = format!("1100,command,revert\n1200,answer,ok\n1300,{plant}");
         let picture = shown(&changed(&reverted), 64);
         assert_eq!(picture["unknownMs"], json!([1300]));
-        assert_eq!((rows::<3>(SPEEDS).len(), rows::<5>(OBJECTS).len()), (2, 0));
-        assert_eq!(rows(WORKED), [[0.0, 500.0]]);
+        assert_eq!((rows::<3>(&picture, SPEEDS).len(), rows::<5>(&picture, OBJECTS).len()), (2, 0));
+        assert_eq!(rows(&picture, WORKED), [[0.0, 500.0]]);
 
-        shown(&changed(&format!("{reverted}1400,command,get\n{SETTINGS}1400,answer,ok\n1500,{plant}")), 64);
+        let picture =
+            shown(&changed(&format!("{reverted}1400,command,get\n{SETTINGS}1400,answer,ok\n1500,{plant}")), 64);
         // It goes on behind a metre.
-        assert_eq!(rows::<5>(OBJECTS)[0][1], 2000.0);
-        assert_eq!(rows::<3>(SPEEDS)[2], [2300.0, 3000.0, 500.0]);
+        assert_eq!(rows::<5>(&picture, OBJECTS)[0][1], 2000.0);
+        assert_eq!(rows::<3>(&picture, SPEEDS)[2], [2300.0, 3000.0, 500.0]);
     }
 
     #[test]
@@ -414,19 +414,18 @@ mod tests {
         let swings =
             [("in", 1000), ("out", 2000), ("in", 3000), ("in", 3500), ("out", 4000), ("in", 8000), ("in", 9500)];
         let swings: String = swings.map(|(tool, pos)| swing(tool, pos)).concat();
-        shown(&format!("{BEGIN}{setting}{status}{swings}{alarm}"), 64);
-        assert_eq!(rows(WORKED), [[1000.0, 2000.0], [3000.0, 4000.0], [8000.0, 9000.0], [9500.0, 9500.0]]);
+        let picture = shown(&format!("{BEGIN}{setting}{status}{swings}{alarm}"), 64);
+        assert_eq!(rows(&picture, WORKED), [[1000.0, 2000.0], [3000.0, 4000.0], [8000.0, 9000.0], [9500.0, 9500.0]]);
         // A reset takes the tool out.
-        shown(&changed("2000,lost,pulled\n2000,connected,0.2.0\n"), 64);
-        assert_eq!(rows(WORKED), [[0.0, 500.0]]);
+        let picture = shown(&changed("2000,lost,pulled\n2000,connected,0.2.0\n"), 64);
+        assert_eq!(rows(&picture, WORKED), [[0.0, 500.0]]);
     }
 
     #[test]
     fn statuses_close_together_are_left_out_and_lines_keep_their_numbers() {
         let statuses: String = (0..10).map(|number| status(100 * number, "in", 1000 * number)).collect();
         let log = format!("{BEGIN}{statuses}0,connected,0.2.0\n{}", status(50, "in", 0));
-        shown(&log, 100);
-        let times: Vec<f64> = rows::<3>(SPEEDS).iter().map(|speed| speed[1]).collect();
+        let times: Vec<f64> = rows::<3>(&shown(&log, 100), SPEEDS).iter().map(|speed| speed[1]).collect();
         assert_eq!(times, [0.0, 300.0, 600.0, 900.0, 50.0]);
         let wrong = shown(&format!("{log}1,gossip,hello\n"), 100);
         assert!(wrong["problem"].as_str().is_some_and(|problem| problem.contains("line 15")), "{wrong}");

@@ -14,16 +14,10 @@ thread_local! {
     static SESSIONS: RefCell<Vec<Option<Session>>> = const { RefCell::new(Vec::new()) };
 }
 
-/// A request to a session, by the session's number.
-#[derive(Deserialize)]
-pub struct Request {
-    session: usize,
-    what: What,
-}
-
+/// A request to a session.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase", rename_all_fields = "camelCase")]
-enum What {
+pub enum What {
     /// Type a command. Answers its number, or `null` if it is no command or too many wait.
     Command { line: String, deadline_ms: f64 },
     /// Type `hold` at once. Answers its number.
@@ -48,35 +42,33 @@ pub fn open(resets: bool) -> Value {
     })
 }
 
-impl Request {
-    /// Does what is requested.
-    ///
-    /// # Errors
-    /// If there is no such session.
-    pub fn take(self) -> Result<Value, String> {
-        SESSIONS.with_borrow_mut(|sessions| {
-            let place = sessions.get_mut(self.session).ok_or("there is no such session")?;
-            let session = place.as_mut().ok_or("the session is closed")?;
-            Ok(match self.what {
-                What::Command { line, deadline_ms } => json!(session.command(&line, moment(deadline_ms))),
-                What::Hold => json!(session.hold()),
-                What::Listen { received } => {
-                    let received: Vec<u8> = received.chars().map(|byte| u8::try_from(byte).unwrap_or(b'?')).collect();
-                    listen(session, &received)
-                }
-                What::Turn { now_ms } => {
-                    let turn = session.turn(moment(now_ms), &[]);
-                    answer(session, turn)
-                }
-                What::Close { why } => {
-                    session.close(why);
-                    let ends = listen(session, &[]);
-                    *place = None;
-                    ends
-                }
-            })
+/// Does what is requested of the session with this number.
+///
+/// # Errors
+/// If there is no such session.
+pub fn take(number: usize, what: What) -> Result<Value, String> {
+    SESSIONS.with_borrow_mut(|sessions| {
+        let place = sessions.get_mut(number).ok_or("there is no such session")?;
+        let session = place.as_mut().ok_or("the session is closed")?;
+        Ok(match what {
+            What::Command { line, deadline_ms } => json!(session.command(&line, moment(deadline_ms))),
+            What::Hold => json!(session.hold()),
+            What::Listen { received } => {
+                let received: Vec<u8> = received.chars().map(|byte| u8::try_from(byte).unwrap_or(b'?')).collect();
+                listen(session, &received)
+            }
+            What::Turn { now_ms } => {
+                let turn = session.turn(moment(now_ms), &[]);
+                answer(session, turn)
+            }
+            What::Close { why } => {
+                session.close(why);
+                let ends = listen(session, &[]);
+                *place = None;
+                ends
+            }
         })
-    }
+    })
 }
 
 fn listen(session: &mut Session, received: &[u8]) -> Value {
@@ -149,7 +141,7 @@ mod tests {
     #[test]
     fn a_session_that_is_closed_takes_no_request() {
         let number = usize::try_from(open(false).as_u64().unwrap()).unwrap();
-        let request = |what| Request { session: number, what }.take();
+        let request = |what| take(number, what);
         let heard = request(What::Listen { received: "\u{ff}\u{100}\r\n".to_owned() }).unwrap();
         assert_eq!(heard, json!({ "news": [], "send": "", "failure": null }));
         let turn = request(What::Turn { now_ms: 0.0 }).unwrap();

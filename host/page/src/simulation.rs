@@ -1,10 +1,8 @@
 //! The machine and the row of "Try it", for the page's virtual Uno: [`field::rolling`], with the verdicts of
 //! [`field::verdict`] on the ground behind the tool.
 //!
-//! There is one simulation, which [`Begun`] begins. [`roll`] and [`hear`] are called hundreds of times a second, so they are
-//! direct calls and no questions. Their results are in tables of numbers ([`crate::table`]).
+//! There is one simulation, which [`Begun`] begins.
 
-use crate::put;
 use field::machine::Machine;
 use field::motion::mm_s;
 use field::planting::{Planting, Sowing};
@@ -36,25 +34,18 @@ const MARGIN_MM: u16 = 22;
 pub struct Begun {
     /// The Uno's cycle at this moment, with the beam at 0 mm.
     cycle: u64,
-    sowing: Sown,
+    /// The parameters of the endless row: its seed, the spacing of its plants, the share of the gaps with a tall weed, and
+    /// the position of the first plant.
+    seed: u64,
+    spacing_mm: f64,
+    weed_share: f64,
+    first_mm: f64,
     /// Whether it is set up by the manual, except for the second beam. Otherwise it is the machine from the box.
     #[serde(default)]
     is_set_up: bool,
     /// Distance from the beam back to a second one; 0 without one.
     #[serde(default)]
     second_beam_mm: f64,
-}
-
-/// The parameters of an endless row.
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-struct Sown {
-    seed: u64,
-    spacing_mm: f64,
-    /// Share of the gaps with a tall weed.
-    weed_share: f64,
-    /// The position of the first plant.
-    first_mm: f64,
 }
 
 /// A change from now on.
@@ -73,27 +64,17 @@ pub enum Different {
     WeedShare(f64),
 }
 
-/// The firmware's zone and margin of a plant.
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub struct Kept {
-    /// Ground on both sides.
-    margin_mm: u32,
-    /// 0 for whole canopies.
-    stem_zone_mm: u32,
-}
-
 /// The verdict on a plant, or whether a weed was cut. Of two passes the greater one counts: the worse verdict on a
 /// plant, and the better one on a weed.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(untagged)]
-enum Fate {
+pub enum Fate {
     Plant(Verdict),
     Weed(bool),
 }
 
 /// The machine with its row and its verdicts.
-struct Simulation {
+pub struct Simulation {
     rolling: Rolling,
     sowing: Sowing,
     /// The first canopy without a verdict, or to be judged again.
@@ -106,18 +87,12 @@ struct Simulation {
     told: usize,
 }
 
-/// The tables, by number: the machine's state, the changes at the pins (cycle, pin, level), and the sown canopies (0 for
-/// a plant and 1 for a weed, position, width).
-const NOW: usize = 0;
-const CHANGES: usize = 1;
-const SOWN: usize = 2;
-
 thread_local! {
     static TRIAL: RefCell<Option<Simulation>> = const { RefCell::new(None) };
 }
 
 /// Runs `act` on the simulation. Fails if there is none.
-fn with<Answer>(act: impl FnOnce(&mut Simulation) -> Answer) -> Result<Answer, String> {
+pub fn with<Answer>(act: impl FnOnce(&mut Simulation) -> Answer) -> Result<Answer, String> {
     let missing = || "no machine was put in front of a row".to_owned();
     TRIAL.with_borrow_mut(|simulation| simulation.as_mut().map(act).ok_or_else(missing))
 }
@@ -132,12 +107,11 @@ impl Begun {
             ..Machine::default()
         };
         let set_up = if self.is_set_up { set_up(&mut machine) } else { Vec::new() };
-        let Sown { seed, spacing_mm, weed_share, first_mm } = self.sowing;
-        let planting = Planting { spacing_mm, ..Planting::default() };
-        let mut sowing = Sowing::new(planting, weed_share, first_mm, seed);
+        let planting = Planting { spacing_mm: self.spacing_mm, ..Planting::default() };
+        let mut sowing = Sowing::new(planting, self.weed_share, self.first_mm, self.seed);
         let mut row = Vec::new();
         sowing.sow(&mut row, SOWN_AHEAD_MM);
-        let mut simulation = Simulation {
+        let simulation = Simulation {
             rolling: Rolling::new(machine, row, 0.0, self.cycle),
             sowing,
             next: 0,
@@ -145,8 +119,6 @@ impl Begun {
             from_s: 0.0,
             told: 0,
         };
-        simulation.tell_now();
-        simulation.tell_sown();
         let dimensions = json!({
             "beamToToolMm": machine.beam_to_tool_mm, "toolWidthMm": machine.tool_width_mm,
         });
@@ -177,92 +149,72 @@ fn set_up(machine: &mut Machine) -> Vec<String> {
     commands
 }
 
-impl Different {
-    /// Applies the change. Returns the levels of the machine's pins.
-    pub fn take(self) -> Result<Value, String> {
-        with(|simulation| {
-            let Simulation { rolling, sowing, .. } = simulation;
-            match self {
-                Self::SpeedKmH(speed_km_h) => rolling.target_mm_s = mm_s(speed_km_h),
-                Self::Slip(share) => rolling.slip_by(share),
-                Self::BeamWireTorn(is_torn) => rolling.faults.beam_wire_torn = is_torn,
-                Self::EncoderDead(is_dead) => rolling.faults.encoder_dead = is_dead,
-                Self::SpacingMm(spacing_mm) => sowing.planting.spacing_mm = spacing_mm,
-                Self::WeedShare(share) => sowing.weed_share = share,
-            }
-            simulation.levels()
-        })
-    }
-}
-
-impl Kept {
-    /// Judges the canopies behind the tool that have no verdict yet. Returns a list of their numbers and verdicts.
-    pub fn judge(&self) -> Result<Value, String> {
-        with(|simulation| json!(simulation.judge(self)))
-    }
-}
-
-/// Rolls the machine on until a cycle of the Uno's clock, and sows ahead of it.
-pub fn roll(cycle: f64) {
-    let _ = with(|simulation| {
-        let changes = simulation.rolling.roll_until(cycle as u64);
-        let numbers = |change: &uno::PinChange| [change.cycle as f64, change.pin.number().into(), change.high.into()];
-        put(CHANGES, changes.iter().flat_map(numbers).collect());
-        let until_mm = simulation.rolling.place_mm() + SOWN_AHEAD_MM;
-        simulation.sowing.sow(&mut simulation.rolling.row, until_mm);
-        simulation.tell_now();
-        simulation.tell_sown();
-    });
-}
-
-/// The Uno has sent its servo a pulse, by the cycles of its edges.
-pub fn hear(rise: f64, fall: f64) {
-    let _ = with(|simulation| {
-        simulation.rolling.hear(Pulse { rise: rise as u64, fall: fall as u64 });
-        simulation.tell_now();
-    });
-}
-
 impl Simulation {
-    /// Writes the machine's state into its table.
-    fn tell_now(&self) {
-        let Self { rolling, .. } = self;
+    /// Applies a change. Returns the levels of the machine's pins.
+    pub fn change(&mut self, different: Different) -> Value {
+        let Self { rolling, sowing, .. } = self;
+        match different {
+            Different::SpeedKmH(speed_km_h) => rolling.target_mm_s = mm_s(speed_km_h),
+            Different::Slip(share) => rolling.slip_by(share),
+            Different::BeamWireTorn(is_torn) => rolling.faults.beam_wire_torn = is_torn,
+            Different::EncoderDead(is_dead) => rolling.faults.encoder_dead = is_dead,
+            Different::SpacingMm(spacing_mm) => sowing.planting.spacing_mm = spacing_mm,
+            Different::WeedShare(share) => sowing.weed_share = share,
+        }
+        self.levels()
+    }
+
+    /// Rolls the machine on until a cycle of the Uno's clock, and sows ahead of it. Returns the changes at the pins:
+    /// cycle, pin and level.
+    pub fn roll(&mut self, cycle: f64) -> Value {
+        let Self { rolling, sowing, .. } = self;
+        let changes = rolling.roll_until(cycle as u64);
+        let until_mm = rolling.place_mm() + SOWN_AHEAD_MM;
+        sowing.sow(&mut rolling.row, until_mm);
+        changes.iter().map(|change| json!([change.cycle, change.pin.number(), change.high])).collect()
+    }
+
+    /// Passes a pulse of the Uno to its servo, by the cycles of its edges.
+    pub fn hear(&mut self, rise: f64, fall: f64) -> Value {
+        json!(self.rolling.hear(Pulse { rise: rise as u64, fall: fall as u64 }))
+    }
+
+    /// The machine's state, and the canopies that were sown since the last call.
+    pub fn look(&mut self) -> Value {
+        let Self { rolling, told, .. } = self;
         let machine = &rolling.machine;
         let degrees = rolling.degrees();
         let across_mm = machine.across_mm(degrees);
-        let is_clear = degrees >= machine.clear_degrees();
-        let now = vec![
-            rolling.place_mm(),
-            rolling.tool_mm(),
-            rolling.speed_mm_s(),
-            degrees,
-            across_mm,
-            f64::from(is_clear),
-            f64::from(across_mm < machine.tool_width_mm / 2.0),
-            f64::from(rolling.is_beam_broken()),
-            rolling.ticks as f64,
-            rolling.ground_mm_a_tick(),
-            rolling.commands as f64,
-        ];
-        put(NOW, now);
-    }
-
-    /// Writes the newly sown canopies into their table.
-    fn tell_sown(&mut self) {
-        let Self { rolling, told, .. } = self;
-        let numbers = |canopy: &Canopy| [f64::from(canopy.kind == Kind::Weed), canopy.position_mm, canopy.width_mm];
-        put(SOWN, rolling.row[*told..].iter().flat_map(numbers).collect());
+        let thing = |canopy: &Canopy| {
+            let kind = if canopy.kind == Kind::Weed { "weed" } else { "plant" };
+            json!({ "kind": kind, "placeMm": canopy.position_mm, "widthMm": canopy.width_mm })
+        };
+        let sown: Vec<Value> = rolling.row[*told..].iter().map(thing).collect();
         *told = rolling.row.len();
+        let state = json!({
+            "placeMm": rolling.place_mm(),
+            "toolMm": rolling.tool_mm(),
+            "speedMmS": rolling.speed_mm_s(),
+            "degrees": degrees,
+            "acrossMm": across_mm,
+            "isClear": degrees >= machine.clear_degrees(),
+            "isWeeding": across_mm < machine.tool_width_mm / 2.0,
+            "isBroken": rolling.is_beam_broken(),
+            "ticks": rolling.ticks,
+            "groundMmATick": rolling.ground_mm_a_tick(),
+            "commands": rolling.commands,
+        });
+        json!({ "state": state, "sown": sown })
     }
 
     fn levels(&self) -> Value {
-        let levels = self.rolling.levels().into_iter().map(|(pin, high)| json!([pin.number(), high]));
-        levels.collect()
+        self.rolling.levels().into_iter().map(|(pin, high)| json!([pin.number(), high])).collect()
     }
 
-    fn judge(&mut self, kept: &Kept) -> Vec<(usize, Fate)> {
+    /// Judges the canopies behind the tool that have no verdict yet. Returns their numbers and verdicts.
+    pub fn judge(&mut self, margin_mm: u32, stem_zone_mm: u32) -> Vec<(usize, Fate)> {
         let is_behind =
-            |canopy: &Canopy| canopy.span_mm().end + f64::from(kept.margin_mm) + BEHIND_MM < self.rolling.tool_mm();
+            |canopy: &Canopy| canopy.span_mm().end + f64::from(margin_mm) + BEHIND_MM < self.rolling.tool_mm();
         let behind = self.rolling.row.partition_point(is_behind);
         let first = std::mem::replace(&mut self.next, behind);
         let (Some(canopies), true) = (self.rolling.row.get(first..behind), first < behind) else {
@@ -271,7 +223,7 @@ impl Simulation {
         let Ok(row) = Row::new(canopies.to_vec()) else {
             return Vec::new();
         };
-        let timing = Timing { margin_mm: kept.margin_mm, stem_zone_mm: kept.stem_zone_mm, ..Timing::default() };
+        let timing = Timing { margin_mm, stem_zone_mm, ..Timing::default() };
         let (motion, pulses, start_cycle) = self.rolling.since(self.from_s);
         let judgement = judge(&row, &self.rolling.machine, &motion, timing, pulses, start_cycle);
         let mut plants = judgement.plants.iter().map(|plant| plant.verdict);

@@ -1,5 +1,4 @@
-//! The page's three files, read from their folder or included in a release, and the form for the code, which is always
-//! included.
+//! The page's three files, and the form for the code.
 
 use axum::body::Bytes;
 use std::fs;
@@ -9,9 +8,6 @@ use thiserror::Error;
 
 /// The page: its content, style and script.
 pub struct Page(pub(super) [Bytes; 3]);
-
-/// The files in this program, if it is a release.
-const INSIDE: Option<[&[u8]; 3]> = include!(concat!(env!("OUT_DIR"), "/inside.rs"));
 
 /// Why there is no page.
 #[derive(Debug, Error)]
@@ -38,9 +34,9 @@ impl Page {
         Ok(Self([read("index.html")?, read("page.css")?, read("page.js")?]))
     }
 
-    /// The included page. Only a release has one.
-    pub fn inside() -> Option<Self> {
-        INSIDE.map(|files| Self(files.map(Bytes::from_static)))
+    /// The page of these files: its content, style and script.
+    pub fn of(files: [&'static [u8]; 3]) -> Self {
+        Self(files.map(Bytes::from_static))
     }
 }
 
@@ -49,16 +45,4 @@ pub(crate) mod form {
     pub const HTML: &str = include_str!("pair/pair.html");
     pub const CSS: &str = include_str!("pair/pair.css");
     pub const JS: &str = include_str!("pair/pair.js");
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_page_is_inside_where_the_build_was_given_one() {
-        let inside = Page::inside();
-        assert_eq!(inside.is_some(), option_env!("WEEDER_PAGE").is_some());
-        assert!(inside.is_none_or(|page| page.0[0].starts_with(b"<!doctype html>")));
-    }
 }

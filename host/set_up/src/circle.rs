@@ -37,10 +37,10 @@ pub fn overlap_ms(speed_mm_s: f64, travel_ms: f64, zone_mm: f64, aside_mm: f64) 
 /// How much farther a trailing arm of the paper's length has to keep off, mm, for a stroke of this pulse. A zone of 0 is
 /// a whole canopy: the tool has to be fully out over it. `rolled_mm` is as for [`carried_mm`].
 pub fn carried_by_stroke_mm(pulse_us: u16, tool_mm: f64, zone_mm: f64, rolled_mm: f64) -> f64 {
-    match zone_mm > 0.0 {
-        true => carried_mm(ARM_MM, tool_mm, zone_mm, rolled_mm),
-        false => ARM_MM - (ARM_MM * ARM_MM - aside_mm(pulse_us).powi(2)).sqrt(),
+    if zone_mm > 0.0 {
+        return carried_mm(ARM_MM, tool_mm, zone_mm, rolled_mm);
     }
+    ARM_MM - (ARM_MM * ARM_MM - aside_mm(pulse_us).powi(2)).sqrt()
 }
 
 /// How much farther a trailing arm's margin has to be, mm: it carries the tool towards the zone before the edge has left

@@ -1,6 +1,6 @@
 //! The leads that follow from the servo's measured times.
 
-use crate::{circle, keeps_stems, pulses};
+use crate::{circle, keeps_stems, stroke_us};
 use control::settings::{Setting, Settings};
 
 /// The servo's scatter beside a stem zone, as a time on its way out and in. The way out has the dead time's scatter, the
@@ -24,16 +24,11 @@ pub(crate) struct Timing {
 
 /// The leads that follow from the times. None if the operator sets them by eye.
 pub(crate) fn leads(timings: &[Timing], settings: &Settings) -> Vec<(Setting, u16)> {
-    let (outs, ins) = extremes(timings);
-    let (Some(longest_ms), Some(shortest_ms)) = (outs.max(), ins.min()) else { return Vec::new() };
+    let Some([(_, longest_ms), (shortest_ms, _)]) = extremes(timings) else { return Vec::new() };
     let [saved_out_ms, saved_in_ms] = if keeps_stems(settings) {
-        let (in_us, out_us) = pulses(settings);
-        saved_ms(
-            settings.get(Setting::TopSpeedMmS).into(),
-            travel_ms(timings),
-            settings.get(Setting::StemZoneMm).into(),
-            circle::aside_mm(in_us.abs_diff(out_us)),
-        )
+        let [top_mm_s, zone_mm] =
+            [Setting::TopSpeedMmS, Setting::StemZoneMm].map(|setting| settings.get(setting).into());
+        saved_ms(top_mm_s, travel_ms(timings), zone_mm, circle::aside_mm(stroke_us(settings)))
     } else {
         [0, 0]
     };
@@ -45,9 +40,8 @@ pub(crate) fn leads(timings: &[Timing], settings: &Settings) -> Vec<(Setting, u1
 
 /// The time of the stroke, from the times that were measured; 0 if it was timed by eye.
 pub(crate) fn travel_ms(timings: &[Timing]) -> f64 {
-    let (outs, ins) = extremes(timings);
     let differ_ms =
-        outs.max().zip(ins.min()).map_or(0, |(longest_ms, shortest_ms)| longest_ms.saturating_sub(shortest_ms));
+        extremes(timings).map_or(0, |[(_, longest_ms), (shortest_ms, _)]| longest_ms.saturating_sub(shortest_ms));
     (f64::from(differ_ms) - BESIDE_STROKE_MS).max(0.0)
 }
 
@@ -59,8 +53,9 @@ pub fn saved_ms(top_speed_mm_s: f64, travel_ms: f64, zone_mm: f64, aside_mm: f64
     [SCATTER_OUT_MS, SCATTER_IN_MS].map(|scatter_ms| (overlap_ms + scatter_ms * of_60_ms) as u16)
 }
 
-/// The leads out and in that were timed.
-pub(crate) fn extremes(timings: &[Timing]) -> (impl Iterator<Item = u16> + Clone, impl Iterator<Item = u16> + Clone) {
-    let leads = || timings.iter().filter_map(|timing| timing.leads);
-    (leads().map(|(out_ms, _)| out_ms), leads().map(|(_, in_ms)| in_ms))
+/// The least and the greatest of the leads out, and of the leads in. `None` if none was timed.
+pub(crate) fn extremes(timings: &[Timing]) -> Option<[(u16, u16); 2]> {
+    let (outs, ins): (Vec<u16>, Vec<u16>) = timings.iter().filter_map(|timing| timing.leads).unzip();
+    let ends = |leads: &[u16]| leads.iter().min().copied().zip(leads.iter().max().copied());
+    Some([ends(&outs)?, ends(&ins)?])
 }

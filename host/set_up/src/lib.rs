@@ -76,7 +76,8 @@ pub struct SetUp {
     /// The settings in use, as far as the session shows them.
     pub settings: Settings,
     timings: Vec<Timing>,
-    ticks_per_m: Vec<u16>,
+    /// The measurements of the wheel.
+    pub ticks_per_m: Vec<u16>,
     slip_permille: VecDeque<i32>,
 }
 
@@ -85,19 +86,15 @@ fn pulses(settings: &Settings) -> (u16, u16) {
     (settings.get(Setting::ServoInUs), settings.get(Setting::ServoOutUs))
 }
 
+/// The length of the stroke, as a pulse width.
+fn stroke_us(settings: &Settings) -> u16 {
+    let (in_us, out_us) = pulses(settings);
+    in_us.abs_diff(out_us)
+}
+
 impl SetUp {
     /// Required measurements of the wheel. Few stretches do not show the slip.
     pub const STRETCHES: usize = 3;
-
-    /// Measurements of the wheel so far.
-    pub fn stretches(&self) -> usize {
-        self.ticks_per_m.len()
-    }
-
-    /// Forgets the measurements of another wheel.
-    pub fn forget_stretches(&mut self) {
-        self.ticks_per_m.clear();
-    }
 
     /// Reads the lines of a session. Typed lines begin with `> `.
     pub fn of_lines<'a>(lines: impl IntoIterator<Item = &'a str>) -> Self {
@@ -127,7 +124,7 @@ impl SetUp {
         for ticks in &self.ticks_per_m {
             lines.extend(["> calibrate 10000".to_owned(), format!("ticks_per_m={ticks}")]);
         }
-        lines.extend(self.slip_permille.iter().map(|permille| format!("slip permille={permille}")));
+        lines.extend(self.slip_permille.iter().rev().map(|permille| format!("slip permille={permille}")));
         lines
     }
 
@@ -167,10 +164,8 @@ impl SetUp {
             }
             EventLine::CalibratedByEye {} => self.timings.push(Timing { leads: None, pulses }),
             EventLine::Slip { permille } => {
-                self.slip_permille.push_back(permille);
-                if self.slip_permille.len() > PLANTS {
-                    self.slip_permille.pop_front();
-                }
+                self.slip_permille.push_front(permille);
+                self.slip_permille.truncate(PLANTS);
             }
             _ => {}
         }
@@ -219,12 +214,13 @@ impl SetUp {
         if !missing.is_empty() {
             return Err(missing);
         }
-        let beam_to_tool_mm = f64::from(settings.get(Setting::BeamToToolMm));
-        let second_beam_mm = f64::from(settings.get(Setting::SecondBeamMm));
+        let [beam_to_tool_mm, second_beam_mm, zone_mm, top_mm_s] =
+            [Setting::BeamToToolMm, Setting::SecondBeamMm, Setting::StemZoneMm, Setting::TopSpeedMmS]
+                .map(|setting| f64::from(settings.get(setting)));
         let slip_mm = if second_beam_mm > 0.0 {
             // The firmware corrects each zone by the slip of the plants just before it. Only a change since then is left.
             let changes = self.slip_permille.iter().zip(self.slip_permille.iter().skip(1));
-            let change = changes.map(|(before, after)| before.abs_diff(*after)).max().unwrap_or(0);
+            let change = changes.map(|(after, before)| after.abs_diff(*before)).max().unwrap_or(0);
             (f64::from(change) / 1000.0).max(SLIP) * (beam_to_tool_mm - second_beam_mm)
         } else {
             let in_use = settings.get(Setting::TicksPerM);
@@ -232,14 +228,12 @@ impl SetUp {
             (f64::from(farthest) / f64::from(in_use.max(1)) + SLIP) * beam_to_tool_mm
         };
         let timings = self.timed(settings);
-        let (outs, ins) = extremes(&timings);
-        let scatter_ms = range(outs).max(range(ins)).max(SERVO_MS);
+        let scatters_ms =
+            extremes(&timings).into_iter().flatten().map(|(least_ms, greatest_ms)| greatest_ms - least_ms);
+        let scatter_ms = scatters_ms.fold(SERVO_MS, u16::max);
         let speed_m_s = if keeps_stems(settings) { SLOW_M_S } else { SPEED_M_S };
-        let stems_mm = keeps_stems(settings).then(|| STEM_SHARE * f64::from(settings.get(Setting::StemZoneMm)));
-        let (in_us, out_us) = pulses(settings);
         let arm_mm = self.trailing_tool_mm.map_or(0.0, |tool_mm| {
-            let (pulse_us, zone_mm) = (in_us.abs_diff(out_us), f64::from(settings.get(Setting::StemZoneMm)));
-            let top_mm_s = settings.get(Setting::TopSpeedMmS).into();
+            let pulse_us = stroke_us(settings);
             let rolled_mm = circle::rolled_mm(top_mm_s, travel_ms(&timings), zone_mm, circle::aside_mm(pulse_us));
             circle::carried_by_stroke_mm(pulse_us, tool_mm.into(), zone_mm, rolled_mm)
         });
@@ -247,7 +241,7 @@ impl SetUp {
             slip_mm,
             servo_mm: f64::from(scatter_ms) * speed_m_s,
             firmware_mm: FIRMWARE_MM * speed_m_s / SPEED_M_S,
-            stems_mm,
+            stems_mm: keeps_stems(settings).then_some(STEM_SHARE * zone_mm),
             arm_mm,
             in_use_mm: settings.get(Setting::MarginMm),
         })
@@ -312,12 +306,6 @@ fn keeps_stems(settings: &Settings) -> bool {
     settings.get(Setting::StemZoneMm) > 0
 }
 
-/// The greatest of some values less the least.
-fn range<T: Ord + Copy + std::ops::Sub<Output = T> + Default>(values: impl Iterator<Item = T> + Clone) -> T {
-    let ends = values.clone().max().zip(values.min());
-    ends.map_or_else(T::default, |(greatest, least)| greatest - least)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -359,11 +347,10 @@ mod tests {
     #[test]
     fn servo_wheel_and_margin_come_one_after_the_other() {
         let next = |lines: &[&[&str]], changes: &[_]| heard(lines).next(&settings(changes)).expect("there is a step");
-        let leads = [(Setting::LeadOutMs, 150), (Setting::LeadInMs, 56)];
-        assert_eq!(next(&[&TIMED[..1]], &leads), Step::TimeServo(1));
-        assert_eq!(next(&[TIMED], &leads), Step::SetLead(Setting::LeadOutMs, 158));
-        let leads = [(Setting::LeadOutMs, 158), (Setting::LeadInMs, 56)];
-        assert_eq!(next(&[TIMED], &leads), Step::SetLead(Setting::LeadInMs, 52));
+        let leads = |out_ms| [(Setting::LeadOutMs, out_ms), (Setting::LeadInMs, 56)];
+        assert_eq!(next(&[&TIMED[..1]], &leads(150)), Step::TimeServo(1));
+        assert_eq!(next(&[TIMED], &leads(150)), Step::SetLead(Setting::LeadOutMs, 158));
+        assert_eq!(next(&[TIMED], &leads(158)), Step::SetLead(Setting::LeadInMs, 52));
         let mut changes = worst_leads(Setting::TicksPerM, 0);
         assert_eq!(next(&[TIMED], &changes), Step::MeasureWheel(0));
         changes[2].1 = 1920;
@@ -472,23 +459,17 @@ mod tests {
 
     #[test]
     fn every_step_fits_on_a_line_of_80_characters() {
-        let margin = Margin {
-            slip_mm: 123.0,
-            servo_mm: 123.0,
-            firmware_mm: 123.0,
-            stems_mm: Some(123.0),
-            arm_mm: 0.0,
-            in_use_mm: 50,
-        };
-        let steps = [
+        let mm = 123.0;
+        let margin =
+            Margin { slip_mm: mm, servo_mm: mm, firmware_mm: mm, stems_mm: Some(mm), arm_mm: 0.0, in_use_mm: 50 };
+        for step in [
             Step::TimeServo(1),
             Step::SetLead(Setting::LeadOutMs, 158),
             Step::MeasureWheel(2),
             Step::PassPlants(11),
             Step::SetMargin(margin),
             Step::Ready(margin),
-        ];
-        for step in steps {
+        ] {
             assert!(step.to_string().len() <= 80, "{} in {step}", step.to_string().len());
         }
     }

@@ -20,7 +20,7 @@ pub use self::table::read_csv;
 
 use self::published::Published;
 use crate::statistics::{
-    AnalysisOfVariance, BinomialModel, Checks, Design, LinearModel, Mean, NoModel, Share, grouped, mean,
+    AnalysisOfVariance, BinomialModel, Checks, Design, LinearModel, Mean, NoModel, Share, grouped,
 };
 use anyhow::{Result, anyhow, ensure};
 use serde::Serialize;
@@ -30,8 +30,6 @@ use serde::Serialize;
 pub struct Analysis {
     /// The plots.
     pub records: Vec<PlotRecord>,
-    /// The measures of each plot, in the same order.
-    pub performances: Vec<Performance>,
     /// The nominal speed of each plot, km/h. It is the plot's own if no nominal speeds were given.
     pub levels_km_h: Vec<f64>,
     /// The analysis of each measure, in the order of [`Response::ALL`].
@@ -114,10 +112,8 @@ impl Analysis {
         for record in &records {
             record.check().map_err(|problem| anyhow!("plot {}: {problem}", record.plot))?;
         }
-        let performances: Vec<Performance> = records.iter().map(PlotRecord::performance).collect();
-        let mut analysis = Self { records, performances, levels_km_h, responses: Vec::new() };
-        analysis.responses = Response::ALL.map(|response| ResponseAnalysis::of(response, &analysis)).to_vec();
-        Ok(analysis)
+        let responses = Response::ALL.map(|response| ResponseAnalysis::of(response, &records, &levels_km_h)).to_vec();
+        Ok(Self { records, levels_km_h, responses })
     }
 
     /// Damaged plants of all plots together.
@@ -127,22 +123,23 @@ impl Analysis {
 
     /// The plots by treatment, slow and narrow first.
     pub fn treatments(&self) -> Vec<Treatment> {
-        let plots = self.records.iter().zip(&self.performances).zip(&self.levels_km_h);
-        let mut of_treatments = grouped(plots.map(|(plot, level)| ((*level, plot.0.spacing_cm), plot)));
+        let plots = self.records.iter().zip(&self.levels_km_h);
+        let mut of_treatments = grouped(plots.map(|(plot, level)| ((*level, plot.spacing_cm), plot)));
         of_treatments.sort_by(|(a, _), (b, _)| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
-        of_treatments.into_iter().map(|(treatment, plots)| Treatment::of(treatment, plots)).collect()
+        of_treatments.into_iter().map(|(treatment, plots)| Treatment::of(treatment, &plots)).collect()
     }
 }
 
 impl ResponseAnalysis {
     /// The analysis of one measure over the plots that have it.
-    fn of(response: Response, Analysis { records, performances, levels_km_h, .. }: &Analysis) -> Self {
-        let with_value = (0..).zip(performances).filter_map(|(plot, of)| Some((plot, response.value(of)?)));
+    fn of(response: Response, records: &[PlotRecord], levels_km_h: &[f64]) -> Self {
+        let with_value =
+            (0..).zip(records).filter_map(|(plot, record)| Some((plot, response.value(&record.performance())?)));
         let (plots, values): (Vec<usize>, Vec<f64>) = with_value.unzip();
         let records = || plots.iter().map(|&plot| &records[plot]);
-        let design = Design::new(records().map(|record| (record.speed_km_h, record.spacing_cm)))
-            .at_levels(plots.iter().map(|&plot| levels_km_h[plot]).collect())
-            .in_blocks(records().map(|record| record.replication).collect());
+        let levels = plots.iter().map(|&plot| levels_km_h[plot]);
+        let factors = records().zip(levels).map(|(of, level)| (of.speed_km_h, of.spacing_cm, level, of.replication));
+        let design = Design::in_blocks(factors);
         let is_measured = if plots.is_empty() { Err(NoModel::NotMeasured) } else { Ok(()) };
         let model = is_measured.and_then(|()| LinearModel::fit(&design, &values));
         let counts: Vec<(u32, u32)> = records().filter_map(|record| response.count(record)).collect();
@@ -164,15 +161,12 @@ impl ResponseAnalysis {
 
 impl Treatment {
     /// The treatment of these plots, at least one.
-    fn of((speed_km_h, spacing_cm): (f64, f64), plots: Vec<(&PlotRecord, &Performance)>) -> Self {
-        let (records, performances): (Vec<&PlotRecord>, Vec<&Performance>) = plots.into_iter().unzip();
-        let values =
-            |quantity: fn(&Performance) -> Option<f64>| performances.iter().copied().filter_map(quantity).collect();
-        let mean_of = |quantity| {
-            let values: Vec<f64> = values(quantity);
-            (!values.is_empty()).then(|| mean(&values))
+    fn of((speed_km_h, spacing_cm): (f64, f64), records: &[&PlotRecord]) -> Self {
+        let mean = |quantity: fn(Performance) -> Option<f64>| {
+            let values: Vec<f64> = records.iter().filter_map(|record| quantity(record.performance())).collect();
+            (!values.is_empty()).then(|| Mean::of(&values))
         };
-        let efficiencies: Vec<f64> = values(|plot| plot.weeding_efficiency_percent);
+        let mean_of = |quantity| mean(quantity).map(|of| of.mean);
         Self {
             speed_km_h,
             spacing_cm,
@@ -185,8 +179,8 @@ impl Treatment {
                 field_efficiency_percent: mean_of(|plot| plot.field_efficiency_percent),
                 performance_index: mean_of(|plot| plot.performance_index),
             },
-            damaged: damaged(records),
-            weeding_efficiency: (!efficiencies.is_empty()).then(|| Mean::of(&efficiencies)),
+            damaged: damaged(records.iter().copied()),
+            weeding_efficiency: mean(|plot| plot.weeding_efficiency_percent),
         }
     }
 }

@@ -32,7 +32,6 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::cell::LazyCell;
-use std::ops::AddAssign;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -134,14 +133,6 @@ pub struct Zones {
     pub reached: u32,
     /// Other zones whose margin was cut.
     pub margins_cut: u32,
-}
-
-impl AddAssign for Zones {
-    fn add_assign(&mut self, other: Self) {
-        self.all += other.all;
-        self.reached += other.reached;
-        self.margins_cut += other.margins_cut;
-    }
 }
 
 /// A plot's number, and its record before weeding.
@@ -257,11 +248,7 @@ impl Experiment {
             let batch = first..rows.min(first + BATCH);
             let weeded: Vec<Vec<PlotOutcome>> = batch
                 .into_par_iter()
-                .map(|row| {
-                    let outcomes = self.weed_row(plot, row, engine)?;
-                    row_done();
-                    Ok(outcomes)
-                })
+                .map(|row| self.weed_row(plot, row, engine).inspect(|_| row_done()))
                 .collect::<Result<_>>()?;
             for row in weeded {
                 if outcomes.is_empty() {
@@ -377,7 +364,9 @@ impl PlotOutcome {
     /// Adds another row of the plot, or another plot. The caller weights the shares.
     fn add(&mut self, other: &Self) {
         self.effect += other.effect;
-        self.zones += other.zones;
+        self.zones.all += other.zones.all;
+        self.zones.reached += other.zones.reached;
+        self.zones.margins_cut += other.zones.margins_cut;
         self.weeded_share += other.weeded_share;
         self.weedable_share += other.weedable_share;
         self.undamaged_share += other.undamaged_share;

@@ -14,9 +14,10 @@ use crate::statistics::{Mean, NoModel};
 use crate::table::{Table, distinct, fixed, optional, short, significant};
 use anyhow::{Context, Result};
 use askama::Template;
+use chart::{Look, Series};
 use field::budget::Part;
 use field::counted;
-use figure::{Curve, Figure};
+use figure::Figure;
 
 /// A trial's report.
 #[derive(Debug, Clone)]
@@ -41,20 +42,22 @@ pub struct Page<'a> {
     pub row: Option<&'a str>,
 }
 
-/// Sentences on the first screen.
-const LEAD: usize = 2;
-
 impl Page<'_> {
     /// The page as HTML, a complete file.
     ///
     /// # Errors
     /// If plotters cannot draw.
     pub fn html(&self) -> Result<String> {
+        /// Sentences on the first screen.
+        const LEAD: usize = 2;
         let analysis = self.analysis;
         let figures = Response::ALL.map(|response| figure::response(analysis, response));
         let chapter = |of| Ok((of, figure::residuals(analysis, of)?));
+        let (lead, further) = self.summary.split_at(self.summary.len().min(LEAD));
         let sheet = Sheet {
             page: self,
+            lead,
+            further,
             controllers: (!self.totals.is_empty()).then(|| Controllers::of(self.totals)).transpose()?,
             figures: figures.into_iter().collect::<Result<_>>()?,
             chapters: analysis.responses.iter().map(chapter).collect::<Result<_>>()?,
@@ -62,26 +65,17 @@ impl Page<'_> {
         sheet.render().context("the page cannot be put together")
     }
 
-    /// The sentences of the first screen.
-    fn lead(&self) -> &[String] {
-        &self.summary[..self.summary.len().min(LEAD)]
-    }
-
-    /// The sentences below it.
-    fn further(&self) -> &[String] {
-        &self.summary[self.summary.len().min(LEAD)..]
-    }
-
     /// The results with their intervals, and where they are from.
     fn results(&self) -> Table {
-        let Analysis { records, performances, .. } = self.analysis;
+        let records = &self.analysis.records;
         let damage = self.analysis.damage();
         let mut rows = vec![vec![
             "plants damaged".to_owned(),
             format!("{} %", damage.shown()),
             format!("{} %, {}, of {} plants", damage, damage.kind(), damage.of),
         ]];
-        let efficiencies: Vec<f64> = performances.iter().filter_map(|plot| plot.weeding_efficiency_percent).collect();
+        let efficiencies = records.iter().filter_map(|plot| plot.performance().weeding_efficiency_percent);
+        let efficiencies: Vec<f64> = efficiencies.collect();
         if !efficiencies.is_empty() {
             let Mean { mean, within } = Mean::of(&efficiencies);
             let within = within
@@ -106,12 +100,9 @@ impl Page<'_> {
         }
         let from = self.parameters.iter().find(|(name, _)| ["field", "plots from"].contains(&name.as_str()));
         if let Some((name, value)) = from {
-            let assumed = if self.totals.is_empty() {
-                "counted by hand"
-            } else {
-                "simulated; its assumptions are under Repeat it"
-            };
-            rows.push(vec![name.clone(), value.clone(), assumed.to_owned()]);
+            let simulated = "simulated; its assumptions are under Repeat it";
+            let basis = if self.totals.is_empty() { "counted by hand" } else { simulated };
+            rows.push(vec![name.clone(), value.clone(), basis.to_owned()]);
         }
         Table { rows, is_prose: true, ..Table::new("Result", ["measure", "value", "interval and basis"]) }
     }
@@ -127,6 +118,9 @@ impl Page<'_> {
 #[template(path = "page.html")]
 struct Sheet<'a> {
     page: &'a Page<'a>,
+    /// The sentences of the first screen, and those below it.
+    lead: &'a [String],
+    further: &'a [String],
     controllers: Option<Controllers>,
     figures: Vec<Figure>,
     /// The analysis of each measure, and its residuals if it has a model.
@@ -143,43 +137,33 @@ struct Controllers {
     beside_others: Table,
 }
 
-/// A measure of the controllers.
-struct Measure {
-    /// Title, unit and caption of its chart.
-    chart: [&'static str; 3],
-    /// Caption of its table.
-    table: &'static str,
-    value: fn(&Total) -> f64,
-}
+/// A measure of the controllers: title, unit and caption of its chart, the caption of its table, and its value.
+type Measure = ([&'static str; 3], &'static str, fn(&Total) -> f64);
 
 const MEASURES: [Measure; 3] = [
-    Measure {
-        chart: [
-            "Plant damage",
-            "% of the plants",
-            "Share of the plants whose stem zone the tool entered. Lower is better.",
-        ],
-        table: "Plants damaged by each controller, %",
-        value: Total::plant_damage_percent,
-    },
-    Measure {
-        chart: [
+    (
+        ["Plant damage", "% of the plants", "Share of the plants whose stem zone the tool entered. Lower is better."],
+        "Plants damaged by each controller, %",
+        Total::plant_damage_percent,
+    ),
+    (
+        [
             "In-row weeding",
             "% of the row's ground",
             "Share of the row's ground that the tool worked. Higher is better, but above the line it costs margins or zones.",
         ],
-        table: "Ground of the row weeded by each controller, %",
-        value: |total| 100.0 * total.plots.weeded_share,
-    },
-    Measure {
-        chart: [
+        "Ground of the row weeded by each controller, %",
+        |total| 100.0 * total.plots.weeded_share,
+    ),
+    (
+        [
             "Zones reached",
             "% of the plants' zones",
             "Share of the zones over which the tool was not fully out. A zone is a plant's protected stretch without the margin. Lower is better.",
         ],
-        table: "Zones reached by each controller, %",
-        value: Total::zones_reached_percent,
-    },
+        "Zones reached by each controller, %",
+        Total::zones_reached_percent,
+    ),
 ];
 
 /// The name of the line below which a controller cuts no margin.
@@ -188,17 +172,19 @@ const BOUND: &str = "most with every zone and margin kept";
 impl Controllers {
     fn of(totals: &[Total]) -> Result<Self> {
         let of = |controller| totals.iter().filter(move |total| total.plots.controller == controller);
-        let curve = |name: &str, controller, value: fn(&Total) -> f64| Curve {
-            name: name.to_owned(),
-            points: of(controller).map(|total| (total.speed_km_h(), value(total))).collect(),
+        let curve = |name: &str, look, controller, value: fn(&Total) -> f64| Series {
+            line: of(controller).map(|total| (total.speed_km_h(), value(total))).collect(),
+            ..Series::of(name, look)
         };
         // The largest share that this servo can weed is that of every controller.
         let first = totals.first().map_or(Treatment::Firmware, |total| total.plots.controller);
-        let bound = curve(BOUND, first, |total| 100.0 * total.plots.weedable_share);
+        let bound = curve(BOUND, Look::LIMIT, first, |total| 100.0 * total.plots.weedable_share);
         let present = || Treatment::ALL.into_iter().filter(|&controller| of(controller).next().is_some());
         let (mut figures, mut tables) = (Vec::new(), Vec::new());
-        for (Measure { chart, table, value }, bound) in MEASURES.into_iter().zip([None, Some(bound), None]) {
-            let mut curves: Vec<Curve> = present().map(|one| curve(one.title(), one, value)).collect();
+        for ((chart, table, value), bound) in MEASURES.into_iter().zip([None, Some(bound), None]) {
+            let looks = (0..).map(Look::of_series);
+            let mut curves: Vec<Series> =
+                present().zip(looks).map(|(one, look)| curve(one.title(), look, one, value)).collect();
             figures.push(figure::curves(chart, &curves, bound.as_ref())?);
             curves.extend(bound);
             tables.push(by_speed(table, &curves));
@@ -215,12 +201,12 @@ impl Controllers {
 }
 
 /// Curves over speed as a table, a row a speed.
-fn by_speed(caption: &str, curves: &[Curve]) -> Table {
-    let speeds = distinct(curves.iter().flat_map(|curve| &curve.points).map(|point| point.0));
+fn by_speed(caption: &str, curves: &[Series]) -> Table {
+    let speeds = distinct(curves.iter().flat_map(|curve| &curve.line).map(|point| point.0));
     let names = curves.iter().map(|curve| curve.name.as_str());
     let mut table = Table::new(caption, ["speed"].into_iter().chain(names));
     for speed in speeds {
-        let value = |curve: &Curve| curve.points.iter().find(|point| point.0 == speed).map(|point| point.1);
+        let value = |curve: &Series| curve.line.iter().find(|point| point.0 == speed).map(|point| point.1);
         let cells = curves.iter().map(|curve| optional(value(curve), |value| fixed(value, 1)));
         table.rows.push([format!("{} km/h", short(speed))].into_iter().chain(cells).collect());
     }
@@ -298,22 +284,19 @@ impl ResponseAnalysis {
     fn equation(&self) -> Result<String, NoModel> {
         let model = self.model.as_ref().map_err(|why| *why)?;
         let estimate = |name| model.term(name).map(|term| term.estimate);
-        let coefficients =
-            Coefficients { constant: estimate("constant"), per_km_h: estimate("speed"), per_cm: estimate("spacing") };
-        Ok(self.written(&coefficients, significant))
+        Ok(self.written(["constant", "speed", "spacing"].map(estimate), significant))
     }
 
     /// The paper's equation. Empty if it is illegible.
     fn published_equation(&self) -> String {
-        self.written(&self.published.equation, short)
+        let Coefficients { constant, per_km_h, per_cm } = self.published.equation;
+        self.written([constant, per_km_h, per_cm], short)
     }
 
     /// The measure as an equation. Empty if no coefficient is known.
-    fn written(&self, coefficients: &Coefficients, said: fn(f64) -> String) -> String {
-        let factors =
-            [(coefficients.constant, ""), (coefficients.per_km_h, " × speed"), (coefficients.per_cm, " × spacing")];
+    fn written(&self, coefficients: [Option<f64>; 3], said: fn(f64) -> String) -> String {
         let mut right = String::new();
-        for (value, factor) in factors {
+        for (value, factor) in coefficients.into_iter().zip(["", " × speed", " × spacing"]) {
             let Some(value) = value else { continue };
             let sign = match (value < 0.0, right.is_empty()) {
                 (true, true) => "\u{2212}",

@@ -69,26 +69,22 @@ impl Plan {
     pub fn write_sheets(&self, mut to: impl io::Write) -> io::Result<()> {
         /// Columns that the plan fills in.
         const PLANNED: usize = 3;
-        writeln!(
-            to,
-            "<!DOCTYPE html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n<title>Field trial, a sheet for each plot</title>"
-        )?;
-        writeln!(
-            to,
-            "<style>body {{ font: 14pt sans-serif; margin: 2em }} section {{ break-after: page; margin-bottom: 3em }} \
-             th {{ text-align: left; padding-right: 2em }} td {{ border: 1px solid; width: 12em; height: 1.8em; padding: 0 0.5em }}</style>"
-        )?;
+        const HEAD: &str = "<!DOCTYPE html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n\
+            <title>Field trial, a sheet for each plot</title>\n\
+            <style>body { font: 14pt sans-serif; margin: 2em } section { break-after: page; margin-bottom: 3em } \
+            th { text-align: left; padding-right: 2em } \
+            td { border: 1px solid; width: 12em; height: 1.8em; padding: 0 0.5em }</style>";
+        writeln!(to, "{HEAD}")?;
         let plots = self.plots();
         for plot in &plots {
             let PlotRecord { plot: number, replication, speed_km_h, spacing_cm, .. } = plot;
-            writeln!(to, "<section>\n<h1>Plot {number} of {}</h1>", plots.len())?;
             writeln!(
                 to,
-                "<p>Block {replication}. Weed it at <b>{speed_km_h} km/h</b>. Plants stand {spacing_cm} cm apart.</p>"
-            )?;
-            writeln!(
-                to,
-                "<p>Count weeds on the same marked ground before and after. Leave a box empty if you did not count.</p>\n<table>"
+                "<section>\n<h1>Plot {number} of {}</h1>\n\
+                 <p>Block {replication}. Weed it at <b>{speed_km_h} km/h</b>. Plants stand {spacing_cm} cm apart.</p>\n\
+                 <p>Count weeds on the same marked ground before and after. Leave a box empty if you did not count.</p>\n\
+                 <table>",
+                plots.len()
             )?;
             for ((_, heading, ..), (column, value)) in COLUMNS.iter().zip(plot.columns()).skip(PLANNED) {
                 writeln!(to, "<tr><th>{heading} <small>({column})</small></th><td>{value}</td></tr>")?;
@@ -122,12 +118,8 @@ mod tests {
             .chunks(8)
             .map(|block| block.iter().map(|plot| (plot.speed_km_h, plot.spacing_cm)).collect())
             .collect();
-        let sorted = |order: &Vec<(f64, f64)>| {
-            let mut order = order.clone();
-            order.sort_by(|a, b| a.partial_cmp(b).unwrap());
-            order
-        };
-        assert!(orders.iter().all(|order| sorted(order) == sorted(&orders[0])));
+        let all = [1.0, 1.5, 2.0, 2.5].map(|speed| [50.0, 60.0].map(|spacing| (speed, spacing))).concat();
+        assert!(orders.iter().all(|order| order.len() == 8 && all.iter().all(|treatment| order.contains(treatment))));
         assert!(orders[0] != orders[1] && orders[1] != orders[2]);
         assert!(plots.chunks(8).zip(1..).all(|(plots, block)| plots.iter().all(|plot| plot.replication == block)));
     }

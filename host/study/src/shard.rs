@@ -39,10 +39,8 @@ impl Shard {
     pub const WHOLE: Self = Self { number: 1, of: 1 };
 
     /// The numbers of its plots, points or runs, ascending from 0.
-    pub fn numbers(self, all: u64) -> impl ExactSizeIterator<Item = u64> {
-        let count = all.saturating_sub(self.number - 1).div_ceil(self.of);
-        // A range of u64 is no exact-size iterator.
-        (0..usize::try_from(count).unwrap_or(usize::MAX)).map(move |turn| self.number - 1 + turn as u64 * self.of)
+    pub fn numbers(self, all: u64) -> impl Iterator<Item = u64> {
+        (self.number - 1..all).step_by(self.of as usize)
     }
 
     fn check(self) -> Result<Self> {
@@ -147,7 +145,7 @@ pub fn read_header(name: &str, from: &mut dyn BufRead) -> Result<Header> {
     };
     let mut line = Vec::new();
     let read = io::Read::take(from, MOST_HEADER).read_until(b'\n', &mut line);
-    read.with_context(|| unreadable(name))?;
+    read.with_context(|| format!("{name} cannot be read"))?;
     if line.is_empty() {
         return Err(no_part("it is empty".to_owned()));
     }
@@ -162,10 +160,6 @@ pub fn read_header(name: &str, from: &mut dyn BufRead) -> Result<Header> {
     let header: Header = serde_json::from_value(value).map_err(|error| no_part(format!("line 1: {error}")))?;
     header.shard.check().map_err(|error| no_part(format!("line 1: shard {}: {error}", header.shard)))?;
     Ok(header)
-}
-
-fn unreadable(name: &str) -> String {
-    format!("{name} cannot be read")
 }
 
 /// Longest header that is read, in bytes: another file may have no line end.
@@ -188,7 +182,7 @@ pub fn read_outcomes<T: DeserializeOwned>(
     let mut outcomes = Vec::new();
     let mut last = 1;
     for (line, text) in (2..).zip(from.lines()) {
-        let text = text.with_context(|| unreadable(name))?;
+        let text = text.with_context(|| format!("{name} cannot be read"))?;
         let outcome: Numbered<T> = serde_json::from_str(&text)
             .map_err(|_| damaged(line, "this is not an outcome of this study, or was cut".to_owned()))?;
         match expected.next() {

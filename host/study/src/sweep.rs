@@ -124,11 +124,7 @@ pub struct Point {
 }
 
 /// A point's values, and its conditions.
-struct Place {
-    x: f64,
-    y: Option<f64>,
-    experiment: Experiment,
-}
+type Place = (f64, Option<f64>, Experiment);
 
 impl Sweep {
     /// Weeds a plot at each point. The first axis varies fastest. `progress` gets the completed share, from 0 to 1.
@@ -150,7 +146,7 @@ impl Sweep {
     /// # Errors
     /// If an axis has an invalid value.
     pub fn warning(&self) -> Result<Option<String>> {
-        Ok(self.places()?.iter().find_map(|place| place.experiment.conditions.warning()))
+        Ok(self.places()?.iter().find_map(|(_, _, experiment)| experiment.conditions.warning()))
     }
 
     /// Weeds a plot at each of a shard's points.
@@ -162,9 +158,9 @@ impl Sweep {
         let mine: Vec<u64> = shard.numbers(self.size()).collect();
         let done = AtomicUsize::new(0);
         let weed = |&number: &u64| {
-            let place = &places[number as usize];
-            let outcomes = place.experiment.run(&Engine::Native, |_| ());
-            let outcomes = outcomes.with_context(|| format!("at {}", self.describe(place)))?;
+            let (x, y, experiment) = &places[number as usize];
+            let outcomes = experiment.run(&Engine::Native, |_| ());
+            let outcomes = outcomes.with_context(|| format!("at {}", self.describe(*x, *y)))?;
             progress((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / mine.len() as f64);
             // One speed, one spacing, one replication and one controller: one plot.
             Ok(outcomes.into_iter().map(move |outcome| Numbered { number, outcome }).collect::<Vec<_>>())
@@ -177,11 +173,11 @@ impl Sweep {
     /// # Errors
     /// If an axis has an invalid value.
     pub fn points(&self, outcomes: &[PlotOutcome]) -> Result<Vec<Point>> {
-        let point = |(place, outcome): (&Place, &PlotOutcome)| {
-            let results = results(outcome, place.experiment.conditions.plot.rows);
-            Point { x: place.x, y: place.y, results, has_alarm: outcome.alarms > 0 }
+        let point = |((x, y, experiment), outcome): (Place, &PlotOutcome)| {
+            let results = results(outcome, experiment.conditions.plot.rows);
+            Point { x, y, results, has_alarm: outcome.alarms > 0 }
         };
-        Ok(self.places()?.iter().zip(outcomes).map(point).collect())
+        Ok(self.places()?.into_iter().zip(outcomes).map(point).collect())
     }
 
     /// All points. The first axis varies fastest.
@@ -194,12 +190,12 @@ impl Sweep {
         let ys: Vec<Option<f64>> =
             self.y.as_ref().map_or(vec![None], |y| y.values.iter().map(|&value| Some(value)).collect());
         let places = ys.iter().flat_map(|&y| self.x.values.iter().map(move |&x| (x, y)));
-        places.map(|(x, y)| Ok(Place { x, y, experiment: self.at(x, y)? })).collect()
+        places.map(|(x, y)| Ok((x, y, self.at(x, y)?))).collect()
     }
 
-    fn describe(&self, place: &Place) -> String {
-        let second = self.y.as_ref().zip(place.y).map(|(axis, y)| format!(", {} = {y}", axis.parameter));
-        format!("{} = {}{}", self.x.parameter, place.x, second.unwrap_or_default())
+    fn describe(&self, x: f64, y: Option<f64>) -> String {
+        let second = self.y.as_ref().zip(y).map(|(axis, y)| format!(", {} = {y}", axis.parameter));
+        format!("{} = {x}{}", self.x.parameter, second.unwrap_or_default())
     }
 
     fn at(&self, x: f64, y: Option<f64>) -> Result<Experiment> {

@@ -36,11 +36,10 @@ const NUMBERS: [u32; 24] = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 1
 /// keep <- -c(2, 9, 10, 23, 24)
 /// speed <- speed[keep]; spacing <- spacing[keep]; y <- y[keep]
 /// ```
-fn unbalanced() -> (Design, Vec<f64>) {
+fn unbalanced() -> (Vec<(f64, f64)>, Vec<f64>) {
     let lost = [1, 8, 9, 22, 23];
     let kept = paper_plots().into_iter().zip(EFFICIENCY).enumerate().filter(|(plot, _)| !lost.contains(plot));
-    let (plots, values): (Vec<_>, Vec<_>) = kept.map(|(_, plot)| plot).unzip();
-    (Design::new(plots), values)
+    kept.map(|(_, plot)| plot).unzip()
 }
 
 /// Asserts that a figure is R's to ten digits.
@@ -128,7 +127,8 @@ fn the_analysis_of_variance_of_a_balanced_trial_is_that_of_r() {
 /// The same lines of R as for the balanced trial, for the plots that are left.
 #[test]
 fn an_unbalanced_trial_is_analysed_as_r_does_with_speed_first() {
-    let (design, values) = unbalanced();
+    let (plots, values) = unbalanced();
+    let design = Design::new(plots);
     let model = LinearModel::fit(&design, &values).unwrap();
     assert_terms(
         &model,
@@ -310,14 +310,19 @@ fn every_part_of_a_trial_gives_finite_figures() {
     assert!(modelled > 1000 && analysed > 800, "{modelled} {analysed}");
 }
 
+/// A design of plots at nominal speeds, each with its block.
+fn in_blocks(plots: impl IntoIterator<Item = ((f64, f64), u32)>) -> Design {
+    Design::in_blocks(plots.into_iter().map(|((speed, spacing), block)| (speed, spacing, speed, block)))
+}
+
 /// ```r
 /// block <- rep(1:3, 8)
 /// anova(lm(y ~ factor(block) + factor(speed) * factor(spacing)))
 /// ```
 #[test]
 fn replications_as_blocks_are_taken_out_first_as_r_does() {
-    let blocks: Vec<u32> = (0..24).map(|plot| plot % 3 + 1).collect();
-    let analysis = AnalysisOfVariance::of(&Design::new(paper_plots()).in_blocks(blocks), &EFFICIENCY).unwrap();
+    let design = in_blocks(paper_plots().into_iter().zip((1..=3).cycle()));
+    let analysis = AnalysisOfVariance::of(&design, &EFFICIENCY).unwrap();
     assert_sources(
         &analysis,
         &[
@@ -338,9 +343,10 @@ fn replications_as_blocks_are_taken_out_first_as_r_does() {
 #[test]
 fn blocks_with_lost_plots_are_taken_out_first_as_r_does() {
     let lost = [1, 8, 9, 22, 23];
-    let blocks = (0..24).filter(|plot| !lost.contains(plot)).map(|plot| plot as u32 % 3 + 1).collect();
-    let (design, values) = unbalanced();
-    let analysis = AnalysisOfVariance::of(&design.in_blocks(blocks), &values).unwrap();
+    let blocks = (0..24).filter(|plot| !lost.contains(plot)).map(|plot| plot % 3 + 1);
+    let (plots, values) = unbalanced();
+    let design = in_blocks(plots.into_iter().zip(blocks));
+    let analysis = AnalysisOfVariance::of(&design, &values).unwrap();
     assert_sources(
         &analysis,
         &[
@@ -406,8 +412,8 @@ fn trial([blocks, speeds, spacings]: [u32; 3], is_lost: fn(usize, u32, u32, u32)
     let kept = plots.into_iter().enumerate().filter(|(plot, (b, s, c))| !is_lost(*plot, *b, *s, *c));
     let plots: Vec<(u32, u32, u32)> = kept.map(|(_, plot)| plot).collect();
     let values = plots.iter().map(|&(b, s, c)| value(b, s, c)).collect();
-    let design = Design::new(plots.iter().map(|&(_, speed, spacing)| (f64::from(speed), f64::from(spacing))));
-    (design.in_blocks(plots.iter().map(|plot| plot.0).collect()), values)
+    let plots = plots.into_iter().map(|(block, speed, spacing)| ((speed.into(), spacing.into()), block));
+    (in_blocks(plots), values)
 }
 
 /// The sum of squares of the means of each group around the mean of all, a value a plot.

@@ -131,7 +131,7 @@ fn speeds_as_measured_have_no_analysis_of_variance_but_an_offer_that_works() {
 #[test]
 fn more_weeds_after_than_before_are_a_negative_efficiency() {
     let analysis = judged("more-weeds-after.csv");
-    assert_close(analysis.performances[4].weeding_efficiency_percent.unwrap(), -15.0);
+    assert_close(analysis.records[4].performance().weeding_efficiency_percent.unwrap(), -15.0);
     let model = analysis.responses[1].model.as_ref().unwrap();
     for (term, (estimate, p)) in model.terms.iter().zip([
         (43.89226839599138, 0.37055806637367183),

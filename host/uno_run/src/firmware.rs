@@ -1,7 +1,7 @@
 //! The firmware: that inside this program, or else that of this workspace.
 //!
-//! A release has its firmware inside, with its budgets. It is written to the user's cache folder, from where it is read
-//! as any other. Otherwise [`build`] runs `cargo firmware` once a process, in its own target directory. So a test or a
+//! A release has its firmware inside, with its budgets: its program calls [`put_inside`]. It is written to the user's
+//! cache folder, from where it is read as any other. Otherwise [`build`] runs `cargo firmware` once a process, in its own target directory. So a test or a
 //! trial always uses the present sources. [`uno::elf`] reads the ELF.
 
 use std::fs;
@@ -20,7 +20,7 @@ use files::whole_file;
 pub const RELEASES: Option<&str> = None;
 
 /// The files inside this program, if it is a release: their names and contents.
-const INSIDE: Option<&[(&str, &[u8])]> = include!(concat!(env!("OUT_DIR"), "/inside.rs"));
+static INSIDE: OnceLock<&[(&str, &[u8])]> = OnceLock::new();
 
 /// The folder with the files inside, or the error, once they were written in this process.
 static WRITTEN: OnceLock<Result<PathBuf, String>> = OnceLock::new();
@@ -57,6 +57,12 @@ const FOREIGN_SETTINGS: [&str; 9] = [
     // It puts a commit into a release's firmware. Measurements must not depend on that.
     "WEEDER_COMMIT",
 ];
+
+/// Uses these files in place of building them: the ELFs, their budgets, and the bootloader's `optiboot.hex`. A second
+/// call changes nothing.
+pub fn put_inside(files: &'static [(&'static str, &'static [u8])]) {
+    INSIDE.get_or_init(|| files);
+}
 
 /// The firmware's ELF.
 ///
@@ -147,7 +153,7 @@ pub fn optiboot() -> Result<Option<PathBuf>> {
 
 /// The folder with the files of this program, if it is a release.
 fn inside() -> Result<Option<&'static Path>> {
-    let Some(files) = INSIDE else { return Ok(None) };
+    let Some(files) = INSIDE.get() else { return Ok(None) };
     let written = WRITTEN.get_or_init(|| {
         let home = etcetera::choose_base_strategy().map_err(|error| format!("no folder for the firmware: {error}"))?;
         write(files, &home.cache_dir()).map_err(|error| format!("{error:#}"))
@@ -187,11 +193,6 @@ fn target_directory() -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_firmware_is_inside_where_the_build_was_given_one() {
-        assert_eq!(INSIDE.is_some(), option_env!("WEEDER_FIRMWARE").is_some());
-    }
 
     #[test]
     fn what_is_inside_is_written_whole_again_where_it_was_damaged_and_beside_that_of_another_build() {

@@ -9,39 +9,13 @@ export {};
 
 declare const FILES: Readonly<Record<string, { readonly hash: string; readonly media: string }>>;
 
-/** The used events and objects of a service worker: the page's own types are only those of a window. */
-interface Lasting extends Event {
-    waitUntil(done: Promise<unknown>): void;
-}
-interface Asked extends Lasting {
-    readonly request: Request;
-    readonly resultingClientId: string;
-    respondWith(answer: Promise<Response>): void;
-}
-interface Told extends Lasting {
-    readonly data: "take over" | "try again" | { readonly started: string };
-    readonly source: Client | null;
-}
-interface Client {
-    readonly url: string;
-    postMessage(text: string): void;
-    navigate(url: string): Promise<unknown>;
-}
-interface Worker {
-    readonly clients: { claim(): Promise<void>; get(id: string): Promise<Client | undefined> };
-    skipWaiting(): Promise<void>;
-    addEventListener(type: "install" | "activate", take: (event: Lasting) => void): void;
-    addEventListener(type: "fetch", take: (event: Asked) => void): void;
-    addEventListener(type: "message", take: (event: Told) => void): void;
-}
-
 const PREFIX = "weeder-page-";
 const NAME = PREFIX + BUILD;
 /** The entry of a page that was shown, and did not start. */
 const DEAD = "dead";
 /** Time for a start: a slow phone takes three seconds. */
 const START_MS = 10_000;
-const worker = globalThis as unknown as Worker;
+const worker = globalThis as unknown as ServiceWorkerGlobalScope;
 const starts = new Set<() => void>();
 
 async function install(): Promise<void> {
@@ -77,15 +51,15 @@ async function watch(id: string): Promise<void> {
     if (isStarted) return;
     const client = await worker.clients.get(id);
     // The operator may have closed it.
-    if (!client) return;
+    if (!(client instanceof WindowClient)) return;
     await (await caches.open(NAME)).put(DEAD, new Response());
     await client.navigate(client.url);
 }
 
 /** Shows the newer page once more. The request for it must not overtake the message. */
-async function tryAgain(client: Client | null): Promise<void> {
+async function tryAgain(client: unknown): Promise<void> {
     await (await caches.open(NAME)).delete(DEAD);
-    await client?.navigate(client.url);
+    if (client instanceof WindowClient) await client.navigate(client.url);
 }
 
 /** A file of the page, and whether it is a newer page that was not seen to start. */

@@ -4,12 +4,7 @@
 // Commands are composed where they are typed. Their words are in the firmware's help.
 
 import { ask } from "../core.ts";
-import type { ConsoleLine, EventLine, Line, Setting } from "./console_line.ts";
-
-/** Whether it is an event, and not a part of an answer. */
-export function isEvent(said: ConsoleLine): said is EventLine {
-    return "isEvent" in said;
-}
+import type { ConsoleLine, Line, Setting } from "./console_line.ts";
 
 export function read(line: string): ConsoleLine {
     return ask<ConsoleLine>({ read: line });
@@ -32,12 +27,11 @@ export interface Steps {
  * the machine reports their errors.
  */
 export function steps(from: readonly Setting[], to: ReadonlyMap<string, number>): Steps {
-    const canBe = (value: number) => Number.isInteger(value) && value >= 0 && value <= 65_535;
+    const isBad = ([, value]: readonly [string, number]) => !(Number.isInteger(value) && value >= 0 && value <= 65_535);
     const values = from.map(({ name, value }) => [name, value] as const);
-    const [good, bad] = [true, false].map((good) => [...to].filter(([, value]) => canBe(value) === good));
-    const change = { from: Object.fromEntries(values), to: Object.fromEntries(good ?? []) };
-    const { steps, ...rest } = ask<Steps>({ steps: change });
-    return { ...rest, steps: [...steps, ...(bad ?? [])] };
+    const good = [...to].filter((entry) => !isBad(entry));
+    const answer = ask<Steps>({ steps: { from: Object.fromEntries(values), to: Object.fromEntries(good) } });
+    return { ...answer, steps: [...answer.steps, ...[...to].filter(isBad)] };
 }
 
 /** Distance of an encoder count, by the values of the settings: of the calibrated wheel, or of its diameter. */

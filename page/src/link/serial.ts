@@ -58,7 +58,6 @@ export class SerialLine {
     onBytes: (bytes: Uint8Array) => void = () => {};
     /** The line is gone, and why; never called after `close`. */
     onEnd: (why: PortError) => void = () => {};
-    readonly #port: SerialPort;
     readonly #writer: WritableStreamDefaultWriter<Uint8Array>;
     readonly #listening: Promise<void>;
     #reader: ReadableStreamDefaultReader<Uint8Array> | undefined;
@@ -77,8 +76,7 @@ export class SerialLine {
         return new SerialLine(port);
     }
 
-    private constructor(port: SerialPort) {
-        this.#port = port;
+    private constructor(private readonly port: SerialPort) {
         if (!port.writable) throw new PortError(english("portGone"));
         const isOver = new Promise<void>((done) => {
             this.#unlock = done;
@@ -102,7 +100,7 @@ export class SerialLine {
     async reset(): Promise<void> {
         const set = async (level: boolean) =>
             // A port without these lines, such as a pseudo terminal, must be reset by hand.
-            this.#port.setSignals({ dataTerminalReady: level, requestToSend: level }).catch(() => {});
+            this.port.setSignals({ dataTerminalReady: level, requestToSend: level }).catch(() => {});
         await set(false);
         await wait(RESET_MS);
         await set(true);
@@ -122,14 +120,14 @@ export class SerialLine {
         await this.#reader?.cancel().catch(ignore);
         await this.#listening;
         this.#writer.releaseLock();
-        await this.#port.close().catch(ignore);
+        await this.port.close().catch(ignore);
         this.#unlock();
     }
 
     async #listen(): Promise<void> {
         // A framing error ends a stream, and the port then has another one. A lost port has none.
-        while (this.#port.readable && !this.#isClosing) {
-            const reader: ReadableStreamDefaultReader<Uint8Array> = this.#port.readable.getReader();
+        while (this.port.readable && !this.#isClosing) {
+            const reader: ReadableStreamDefaultReader<Uint8Array> = this.port.readable.getReader();
             this.#reader = reader;
             try {
                 for (;;) {

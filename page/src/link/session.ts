@@ -6,7 +6,7 @@
 import { ask } from "../core.ts";
 import { english } from "../words/words.ts";
 import type { EventLine, Line, Setting } from "./console_line.ts";
-import { isEvent, linesOf, read } from "./grammar.ts";
+import { linesOf, read } from "./grammar.ts";
 
 /** Types a command, and returns its answer without the `ok`. Throws `Refused` if the machine refuses it. */
 export type Ask = (command: string) => Promise<string[]>;
@@ -108,7 +108,7 @@ export function tell(news: News, onHappening: (happening: Happening) => void): v
         default: {
             const [line, said] = [news.said, read(news.said)];
             if (said.is === "status") onHappening({ is: "status", status: said, line });
-            else if (isEvent(said)) onHappening({ is: "event", event: said, line });
+            else if ("isEvent" in said) onHappening({ is: "event", event: said, line });
         }
     }
 }
@@ -132,12 +132,6 @@ interface Turn {
     readonly failure: Failure | null;
 }
 
-/** Who waits for the end of a command. */
-interface Asker {
-    done(answer: string[]): void;
-    failed(error: Error): void;
-}
-
 export class Session implements Link {
     onHappening: (happening: Happening) => void = () => {};
     /** Its number in the Rust. */
@@ -146,8 +140,8 @@ export class Session implements Link {
     #received = "";
     #ended = false;
     #isTurning = false;
-    /** By the command's number. Several may wait for a `hold`. */
-    readonly #askers = new Map<number, Asker[]>();
+    /** Who waits for the end of a command, by its number. Several may wait for a `hold`. */
+    readonly #askers = new Map<number, { done(answer: string[]): void; failed(error: Error): void }[]>();
     /** The lines of the answer in progress. */
     #answer: string[] = [];
 
@@ -198,7 +192,7 @@ export class Session implements Link {
         if (this.#ended) return;
         this.#ended = true;
         const { news } = this.#request<Turn>({ close: { why } });
-        for (const one of news) if (one.is === "unanswered") this.#take({ ...one, because: why });
+        for (const one of news) if (one.is === "unanswered") this.#take(one, why);
         this.onHappening({ is: "lost", why, forGood: true, isWanted });
         void this.wire.close();
     }
@@ -217,12 +211,7 @@ export class Session implements Link {
         const why = failure && whyNone(failure);
         try {
             if (send !== "") this.wire.send(send);
-            for (const one of news) {
-                if (why === null) this.#take(one);
-                else if (one.is === "unanswered") this.#take({ ...one, because: why });
-                // `end` tells it.
-                else if (one.is !== "lost") this.#take(one);
-            }
+            for (const one of news) this.#take(one, why);
         } finally {
             this.#isTurning = false;
         }
@@ -245,9 +234,12 @@ export class Session implements Link {
         this.#askers.delete(number);
     }
 
-    #take(news: Turn["news"][number]): void {
+    /** Takes news. `why` is why the session ends, if it does. */
+    #take(news: Turn["news"][number], why: string | null): void {
         switch (news.is) {
             case "lost":
+                // `end` tells it.
+                if (why !== null) break;
                 this.#answer = [];
                 this.onHappening({ ...news, forGood: false, isWanted: false });
                 break;
@@ -267,7 +259,7 @@ export class Session implements Link {
                 break;
             }
             case "unanswered":
-                this.#fail(news.number, whyNot(news.why, news.because ?? ""));
+                this.#fail(news.number, whyNot(news.why, why ?? news.because ?? ""));
                 break;
             default:
                 tell(news, (happening) => this.onHappening(happening));
@@ -283,14 +275,7 @@ function whyNone({ is, about }: Failure): string {
 
 /** Why a command was not answered. */
 function whyNot(why: "late" | "held" | "notTyped" | "unknown", because: string): Error {
-    switch (why) {
-        case "late":
-            return new Refused(english("waitedTooLong"));
-        case "held":
-            return new Refused(english("holdFirst"));
-        case "notTyped":
-            return new NoMachine(because);
-        case "unknown":
-            return new NoMachine(english("mayBeDone", { why: because }));
-    }
+    if (why === "late") return new Refused(english("waitedTooLong"));
+    if (why === "held") return new Refused(english("holdFirst"));
+    return new NoMachine(why === "unknown" ? english("mayBeDone", { why: because }) : because);
 }

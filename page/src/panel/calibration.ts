@@ -97,7 +97,6 @@ export class Calibration {
         }
     }
 
-    /** Types a command and shows its result. Returns the error, if any. */
     #do(said: string, command: string, done: (answer: string[]) => string): Promise<unknown> {
         return this.parts.attempt(said, this.ask(command), done);
     }

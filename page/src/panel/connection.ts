@@ -75,7 +75,6 @@ export class Connection {
         this.#show();
     }
 
-    /** Closes this port, if it is the open one. */
     async release(port: SerialPort): Promise<void> {
         if (port === this.#port) await this.disconnect();
     }

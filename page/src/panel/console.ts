@@ -19,7 +19,6 @@ export class Console {
     /** Whether it was shown since it was hidden. A browser forgets how far a hidden element is scrolled. */
     #isShown = false;
 
-    /** `type` types a line to the machine. */
     constructor(parts: Parts, type: (line: string) => void) {
         const said = parts.html("said");
         this.#said = said;
@@ -27,16 +26,17 @@ export class Console {
             if (this.#isShown) this.#follows = said.scrollHeight - said.scrollTop - said.clientHeight < AT_THE_END;
         });
         const input = parts.get("typed", HTMLInputElement);
+        const enter = (line: string) => {
+            this.#recalled = this.#typed.push(line);
+            type(line);
+        };
         // The field would join pasted lines to one, and cut a long one.
         const paste = (event: Event, data: DataTransfer | null) => {
             const text = data?.getData("text/plain") ?? "";
             const lines = text.split(/[\r\n]+/).filter((line) => line.trim() !== "");
             if (lines.length < 2 && text.length <= input.maxLength) return;
             event.preventDefault();
-            for (const line of lines) {
-                this.#recalled = this.#typed.push(line.trim());
-                type(line.trim());
-            }
+            for (const line of lines) enter(line.trim());
         };
         input.addEventListener("paste", (event) => paste(event, event.clipboardData));
         input.addEventListener("drop", (event) => paste(event, event.dataTransfer));
@@ -44,9 +44,7 @@ export class Console {
             event.preventDefault();
             const line = input.value.trim();
             input.value = "";
-            if (line === "") return;
-            this.#recalled = this.#typed.push(line);
-            type(line);
+            if (line !== "") enter(line);
         });
         input.addEventListener("keydown", (event) => {
             const by = { ArrowUp: -1, ArrowDown: 1 }[event.key];

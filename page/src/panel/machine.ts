@@ -5,7 +5,7 @@ import { plain } from "../dom.ts";
 import type { EventLine, Line, Mode, Setting } from "../link/console_line.ts";
 import { read, tickMm } from "../link/grammar.ts";
 import type { Happening } from "../link/session.ts";
-import { advice, english, type Plain, quantity, say, told } from "../words/words.ts";
+import { english, type Plain, quantity, say, table, told } from "../words/words.ts";
 
 /** Objects that are remembered. */
 const OBJECTS = 50;
@@ -16,7 +16,7 @@ const OBJECTS = 50;
  */
 export function fault(name: string): { title: string; advice: string } {
     const found = faults.find((fault) => fault.name === name) ?? { title: name, advice: say("lookItUp") };
-    return { title: found.title, advice: advice(name) ?? found.advice };
+    return { title: found.title, advice: table.advice?.[name] ?? found.advice };
 }
 
 /** Why the tool is out at work, in words for the operator. */
@@ -40,7 +40,6 @@ const FRESH_MS = 1000;
 export class Machine {
     /** The firmware's version, if the machine is connected. */
     version: string | undefined;
-    /** Whether this page may start it. */
     mayStart = true;
     /** Why it is lost, in English. */
     #lost: string = english("noneConnected");
@@ -57,7 +56,6 @@ export class Machine {
     alarm: string | undefined;
     warning: string | undefined;
     status: Line<"status"> | undefined;
-    /** When the status came. */
     statusMs = 0;
     settings: readonly Setting[] = [];
     help: ReadonlyMap<string, string> = new Map();
@@ -147,7 +145,6 @@ export class Machine {
         return this.settings.find((setting) => setting.name === name)?.value ?? 0;
     }
 
-    /** Distance of an encoder count. */
     get tickMm(): number {
         return tickMm((name) => this.setting(name));
     }
@@ -156,7 +153,6 @@ export class Machine {
         return millimetres / Math.max(this.tickMm, 1e-6);
     }
 
-    /** How wide an object was. */
     widthMm({ hold }: Line<"detection">): number {
         return hold * this.tickMm - 2 * this.setting("margin_mm");
     }
@@ -221,7 +217,6 @@ export class Machine {
     }
 }
 
-/** A text as a sentence. */
 export function sentence(text: string): string {
     const shown = plain(text);
     return `${shown.charAt(0).toUpperCase()}${shown.slice(1)}${/[.!?।]$/.test(shown) ? "" : "."}`;

@@ -78,7 +78,9 @@ export class Panel {
         this.#examples = new Examples(parts, this.machine, ask);
         this.#strip = parts.get("strip", SVGSVGElement);
         parts.button("hold", () => this.hold());
-        for (const command of ["start", "clear"]) parts.button(command, () => this.#drive(ask(command)));
+        const why = (error: unknown) => sentence(told(error));
+        for (const command of ["start", "clear"])
+            parts.button(command, () => void parts.attempt("drive-said", ask(command), undefined, why));
         parts.button("log-save", () => download("weeder-log.csv", this.#log.text(), "text/csv"));
         parts.button("log-clear", () => {
             this.#log = new Log();
@@ -151,7 +153,6 @@ export class Panel {
         }
     }
 
-    /** Talks to this machine from now on. */
     connect(link: Link, nowMs: number): void {
         this.#now = nowMs;
         if (this.#holdPending) this.#holdPending.againMs = nowMs;
@@ -209,7 +210,6 @@ export class Panel {
         const { restarted } = machine;
         const restart = restarted === undefined ? "" : say("restarted", { cause: restarted });
         parts.html("alarm").hidden = trouble === undefined && restarted === undefined;
-        parts.html("alarm").classList.toggle("warning", machine.alarm === undefined && restarted === undefined);
         parts.html("clear").hidden = machine.alarm === undefined;
         if (trouble !== undefined) {
             const { title, advice } = fault(trouble);
@@ -293,10 +293,6 @@ export class Panel {
         const isOther = state !== this.#heard.state;
         if (isOther || heard !== this.#heard.text) this.#heard = { text: heard, state, sinceMs: nowMs };
         if (isOther || nowMs - this.#heard.sinceMs > LASTING_MS) this.#parts.write("heard", this.#row + heard);
-    }
-
-    #drive(command: Promise<unknown>): void {
-        void this.#parts.attempt("drive-said", command, undefined, (error) => sentence(told(error)));
     }
 
     #wireTabs(name: string, tabs: readonly (typeof TABS)[number][]): void {

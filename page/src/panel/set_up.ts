@@ -6,7 +6,7 @@ import { make, makeButton, type Parts, plain } from "../dom.ts";
 import { read } from "../link/grammar.ts";
 import type { Ask, Happening } from "../link/session.ts";
 import { Rust } from "../rust.ts";
-import { language, quantity, say, show, step, told, type Word } from "../words/words.ts";
+import { language, type Plain, quantity, say, show, table, told } from "../words/words.ts";
 import type { Machine } from "./machine.ts";
 
 /** The results of the session for the steps. */
@@ -95,12 +95,13 @@ export class SetUp {
         this.#marks = steps.map((manual, at) => (manual.isShown ? make("p", "aside") : this.#box(at)));
         this.parts.html("set-up-steps").replaceChildren(
             ...steps.map((manual, at) => {
-                const [title, how] = step(manual.title, manual.how);
+                const text = table.steps?.[manual.title] ?? `${manual.title}. ${manual.how}`;
+                const [title = ""] = text.split(".", 1);
                 const mark = this.#marks[at] ?? "";
                 return make(
                     "li",
                     "stack",
-                    make("span", "", make("b", "", title), ". ", how),
+                    make("span", "", make("b", "", title), text.slice(title.length)),
                     ...this.#tasks(manual.tasks),
                     manual.isShown ? mark : make("label", "", mark, say("markDone")),
                 );
@@ -108,7 +109,6 @@ export class SetUp {
         );
     }
 
-    /** A box with which the operator marks a step. */
     #box(at: number): HTMLInputElement {
         const box = make("input", "");
         box.type = "checkbox";
@@ -120,14 +120,13 @@ export class SetUp {
         return box;
     }
 
-    /** The inputs and buttons for the tasks of a step. */
     #tasks(tasks: readonly string[]): HTMLElement[] {
         const said = make("p", "");
         said.role = "status";
-        const does = (text: string, use: () => Promise<unknown>, done: Word) => {
+        const does = (text: string, use: () => Promise<unknown>, done: Plain) => {
             const button = makeButton("needs-machine", () => {
                 use().then(
-                    () => show(said, () => say(done as "isSavedNow")),
+                    () => show(said, () => say(done)),
                     (error) => show(said, () => told(error)),
                 );
             });
@@ -153,7 +152,6 @@ export class SetUp {
         return [...parts, said];
     }
 
-    /** Sets and saves the values of a step. */
     async #save(names: readonly string[]): Promise<void> {
         for (const name of names) {
             const input = this.#inputs.get(name);

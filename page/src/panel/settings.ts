@@ -6,7 +6,7 @@ import type { Setting } from "../link/console_line.ts";
 import { steps as order } from "../link/grammar.ts";
 import type { Ask } from "../link/session.ts";
 import { parse, range, SettingsFileError, save } from "../link/settings_file.ts";
-import { type Plain, reason, say, settingHelp, told } from "../words/words.ts";
+import { type Plain, reason, say, table, told } from "../words/words.ts";
 import { type Machine, sentence } from "./machine.ts";
 
 export class SettingsForm {
@@ -79,7 +79,7 @@ export class SettingsForm {
             saved === value
                 ? ""
                 : `; ${saved === undefined ? say("notSaved") : say("isSaved", { value: shown(setting, saved) })}`;
-        const inOwnWords = settingHelp(name);
+        const inOwnWords = table.settings?.[name];
         const help = make("span", "", inOwnWords ?? this.machine.help.get(name) ?? "");
         // The machine speaks English.
         if (inOwnWords === undefined) help.lang = "en";

@@ -13,7 +13,6 @@ import type { Machine } from "./machine.ts";
 const BEHIND = 0.25;
 const HEIGHT = 0.22;
 
-/** Draws the state at a time. */
 export function drawStrip(svg: SVGSVGElement, machine: Machine, nowMs: number): void {
     const beamMm = machine.setting("beam_to_tool_mm") || 400;
     const [left, length] = [-BEHIND * beamMm, (1 + 2 * BEHIND) * beamMm];

@@ -9,16 +9,11 @@ import { chosen, keep } from "../preferences.ts";
 import { say } from "../words/words.ts";
 import type { Panel } from "./panel.ts";
 
-interface Firmware {
-    readonly version: string;
-    readonly settings: readonly string[];
-}
-
 /** The key of the stored settings, until the new firmware has them. */
 const KEPT = "settings";
 
 export class Update {
-    readonly #own = askRust<Firmware>("firmware");
+    readonly #own = askRust<{ readonly version: string; readonly settings: readonly string[] }>("firmware");
 
     /** `flash` opens the view for flashing. */
     constructor(

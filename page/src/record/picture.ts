@@ -39,7 +39,7 @@ export interface Problem {
     readonly problem: string;
 }
 
-/** The Rust's answer besides its tables. */
+/** The Rust's answer. */
 interface Head {
     readonly lengthMm: number;
     readonly timeMs: number;
@@ -49,6 +49,8 @@ interface Head {
     readonly hasPlaces: boolean;
     /** Times from which on nothing is drawn: the log lacks the settings in use. */
     readonly unknownMs: readonly number[];
+    /** Of the detections, the speeds, and the worked ground. */
+    readonly tables: readonly [Float64Array, Float64Array, Float64Array];
 }
 
 /** Rows of numbers in the log's order. */
@@ -103,11 +105,6 @@ export interface Picture extends Head {
     readonly fastestMmS: number;
 }
 
-interface Answer<Said> {
-    readonly said: Said;
-    readonly tables: readonly Float64Array[];
-}
-
 export class Cancelled extends Error {}
 
 /** How work goes on: `progress` gets its share that is done, from 0 to 1, and `cancel` ends it. */
@@ -119,20 +116,16 @@ export interface Work {
 let address: string | undefined;
 
 /** Asks a question. The worker ends with its answer, or when the work is cancelled. */
-export function read<Said>(
-    logs: readonly File[],
-    wants: Asked["wants"],
-    { progress, cancel }: Work,
-): Promise<Answer<Said>> {
+export function read<Said>(logs: readonly File[], wants: Asked["wants"], { progress, cancel }: Work): Promise<Said> {
     address ??= URL.createObjectURL(new Blob([code], { type: "text/javascript" }));
     const worker = new Worker(address);
-    const answer = new Promise<Answer<Said>>((resolve, reject) => {
+    const answer = new Promise<Said>((resolve, reject) => {
         cancel.addEventListener("abort", () => reject(new Cancelled()), { once: true });
         worker.addEventListener("error", ({ message }) => reject(new Error(message)));
         worker.addEventListener("message", ({ data }: MessageEvent<Told>) => {
             if ("share" in data) progress(data.share);
             else if ("why" in data) reject(new Error(data.why));
-            else resolve({ said: data.answer as Said, tables: data.tables });
+            else resolve(data.answer as Said);
         });
     });
     worker.postMessage({ module, logs, wants } satisfies Asked);
@@ -140,9 +133,9 @@ export function read<Said>(
 }
 
 export async function picture(log: File, work: Work): Promise<Picture | Problem> {
-    const { said, tables } = await read<Head | Problem>([log], "picture", work);
-    const [objects, speeds, worked] = tables;
-    if ("problem" in said || !objects || !speeds || !worked) return said as Problem;
+    const said = await read<Head | Problem>([log], "picture", work);
+    if ("problem" in said) return said;
+    const [objects, speeds, worked] = said.tables;
     let fastestMmS = 1;
     for (let at = SPEED.indexOf("mmS"); at < speeds.length; at += SPEED.length)
         fastestMmS = Math.max(fastestMmS, Math.abs(speeds[at] ?? 0));

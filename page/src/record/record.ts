@@ -207,7 +207,7 @@ export class RecordView {
         const files = this.#rows.map(({ file }) => file);
         const results: (() => string)[] = [];
         const isWhole = await this.#eachOf(files, "log-replayed", async (file, work) => {
-            const { said: result } = await read<Replayed | Problem>([file], "replay", work);
+            const result = await read<Replayed | Problem>([file], "replay", work);
             results.push(() => this.#of(file, "problem" in result ? sentence(result.problem) : agreement(result)));
         });
         if (isWhole) this.parts.say("log-replayed", () => results.map((result) => result()).join(" "));
@@ -221,7 +221,7 @@ export class RecordView {
             north: say("north"),
         };
         await this.#eachOf(files.slice(0, 1), "log-mapped", async (_, work) => {
-            const { svg, placed } = (await read<GroundMap>(files, { map: words }, work)).said;
+            const { svg, placed } = await read<GroundMap>(files, { map: words }, work);
             this.parts.say("log-mapped", () => (svg ? say("mapped", { count: placed }) : say("noMap")));
             this.#showMap(svg);
         });

@@ -19,16 +19,12 @@ export interface MapWords {
     readonly north: string;
 }
 
-/** Its messages: the progress from 0 to 1, the answer with its tables, or the error. */
-export type Told =
-    | { readonly share: number }
-    | { readonly answer: unknown; readonly tables: readonly Float64Array<ArrayBuffer>[] }
-    | { readonly why: string };
+/** Its messages: the progress from 0 to 1, the answer, or the error. */
+export type Told = { readonly share: number } | { readonly answer: unknown } | { readonly why: string };
 
 const PIECE_BYTES = 1 << 20;
 /** Share of the reading in the total time, for a replay and for a map. */
 const READING = { replay: 0.05, map: 0.5 };
-const TABLES = [0, 1, 2];
 
 const own = globalThis as unknown as Worker;
 const tell = (told: Told, move: Transferable[] = []) => own.postMessage(told, move);
@@ -51,10 +47,11 @@ async function answer({ module, logs, wants }: Asked): Promise<void> {
         const put = isMap ? rust.ask<{ problem?: string }>("job") : {};
         if (put.problem) throw new Error(put.problem);
     }
-    const answer = rust.ask(wants);
-    const tables = isWhole ? [] : TABLES.map((number) => rust.table(number).slice());
+    const answer = rust.ask<{ tables?: number[][] }>(wants);
+    // The page takes them over without a copy.
+    const tables = answer.tables?.map((table) => Float64Array.from(table));
     tell(
-        { answer, tables },
-        tables.map(({ buffer }) => buffer),
+        { answer: { ...answer, tables } },
+        tables?.map(({ buffer }) => buffer),
     );
 }

@@ -24,12 +24,6 @@ export function span({ placeMm, widthMm }: Thing): { startMm: number; endMm: num
     return { startMm: placeMm - widthMm / 2, endMm: placeMm + widthMm / 2 };
 }
 
-/** The differences from the machine from the box: `Begun` in host/page/src/simulation.rs. */
-interface MachineKind {
-    readonly isSetUp?: boolean;
-    readonly secondBeamMm?: number;
-}
-
 /** The random row in front of the machine, which continues while the machine rolls. */
 export interface Sowing {
     readonly seed: number;
@@ -38,11 +32,6 @@ export interface Sowing {
     readonly weedShare: number;
     /** The first plant's position. */
     readonly firstMm: number;
-}
-
-export interface Dimensions {
-    readonly beamToToolMm: number;
-    readonly toolWidthMm: number;
 }
 
 /** The result for a plant: its margin was kept, the tool came nearer, or the tool was not out over its canopy. */
@@ -60,20 +49,16 @@ export type Change =
 type Levels = [pin: number, high: boolean][];
 
 interface Begun {
-    readonly dimensions: Dimensions;
+    readonly dimensions: { readonly beamToToolMm: number; readonly toolWidthMm: number };
     readonly setUp: readonly string[];
     readonly levels: Levels;
 }
 
-/** The tables of host/page/src/simulation.rs. */
-const TABLE = { now: 0, changes: 1, sown: 2 } as const;
-
 export class Machine {
     readonly uno: Uno;
-    readonly dimensions: Dimensions;
+    readonly dimensions: Begun["dimensions"];
     /** The commands that set up its firmware. */
     readonly setUp: readonly string[];
-    /** The things in the row so far. */
     readonly things: Thing[] = [];
     /** The ground that the beam sees, and the ground under the tool. */
     placeMm = 0;
@@ -88,7 +73,6 @@ export class Machine {
     isClear = true;
     /** Whether the tool works the row's line. */
     isWeeding = false;
-    /** Whether the beam is broken. */
     isBroken = false;
     /** Net counts of a perfect encoder since the start, and the distance of one count. */
     ticks = 0;
@@ -98,10 +82,13 @@ export class Machine {
     readonly #rust = new Rust(module);
     #pulseRise = 0;
 
-    /** Places a standing machine in front of a row, at the Uno's cycle. */
-    constructor(uno: Uno, sowing: Sowing, kind: MachineKind = {}) {
+    /**
+     * Places a standing machine in front of a row, at the Uno's cycle. `kind` has the differences from the machine from
+     * the box: `Begun` in host/page/src/simulation.rs.
+     */
+    constructor(uno: Uno, sowing: Sowing, kind: { isSetUp?: boolean; secondBeamMm?: number } = {}) {
         this.uno = uno;
-        const begin = { cycle: uno.cycle, sowing, ...kind };
+        const begin = { cycle: uno.cycle, ...sowing, ...kind };
         const { dimensions, setUp, levels } = this.#rust.ask<Begun>({ begin });
         [this.dimensions, this.setUp] = [dimensions, setUp];
         this.#set(levels);
@@ -111,7 +98,7 @@ export class Machine {
         uno.onLevel = (pin, high, cycle) => {
             if (pin !== PIN.servo) return;
             if (high) this.#pulseRise = cycle;
-            else this.#rust.exports.hear(this.#pulseRise, cycle);
+            else this.#rust.ask({ hear: [this.#pulseRise, cycle] });
         };
     }
 
@@ -122,12 +109,10 @@ export class Machine {
     /** Rolls on until a future cycle, and lets the Uno's clock run until then. */
     runUntil(cycle: number): void {
         const { uno } = this;
-        this.#rust.exports.roll(cycle);
-        // A copy: the servo's pulses call the core, which changes its memory.
-        const changes = this.#rust.table(TABLE.changes).slice();
-        for (let at = 0; at < changes.length; at += 3) {
-            uno.runUntil(changes[at] ?? 0);
-            uno.set(changes[at + 1] ?? 0, changes[at + 2] === 1);
+        const changes = this.#rust.ask<[cycle: number, pin: number, high: boolean][]>({ roll: cycle });
+        for (const [at, pin, high] of changes) {
+            uno.runUntil(at);
+            uno.set(pin, high);
         }
         uno.runUntil(cycle);
         this.#look();
@@ -145,17 +130,9 @@ export class Machine {
         for (const [pin, high] of levels) this.uno.set(pin, high);
     }
 
-    /** Reads the machine's state and the newly sown things. */
     #look(): void {
-        const now = this.#rust.table(TABLE.now);
-        const [placeMm = 0, toolMm = 0, speedMmS = 0, degrees = 0, acrossMm = 0] = now;
-        const [isClear, isWeeding, isBroken, ticks = 0, groundMmATick = 0, commands = 0] = now.subarray(5);
-        const numbers = { placeMm, toolMm, speedMmS, degrees, acrossMm, ticks, groundMmATick, commands };
-        Object.assign(this, numbers, { isClear: isClear === 1, isWeeding: isWeeding === 1, isBroken: isBroken === 1 });
-        const sown = this.#rust.table(TABLE.sown);
-        for (let at = 0; at < sown.length; at += 3) {
-            const [kind, placeMm = 0, widthMm = 0] = sown.subarray(at, at + 3);
-            this.things.push({ kind: kind === 0 ? "plant" : "weed", placeMm, widthMm });
-        }
+        const { state, sown } = this.#rust.ask<{ state: object; sown: Thing[] }>("look");
+        Object.assign(this, state);
+        this.things.push(...sown);
     }
 }

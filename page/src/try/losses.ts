@@ -5,7 +5,7 @@
 // state, its reason, and its keep-out zones.
 
 import type { Machine, Thing } from "../row/machine.ts";
-import { quantity, say, type Word } from "../words/words.ts";
+import { quantity, say } from "../words/words.ts";
 
 /** A keep-out zone along the row. */
 export interface Zone {
@@ -13,30 +13,19 @@ export interface Zone {
     readonly endMm: number;
 }
 
-/** The parts of the ground, with the text of each. */
+/** The parts of the ground: the text of each, and of a tall weed that was left on it. */
 const PARTS = {
-    weeded: "groundWeeded",
-    plants: "groundPlants",
-    margins: "groundMargins",
-    weeds: "groundWeeds",
-    swings: "groundSwings",
-    closed: "groundClosed",
-} as const satisfies Record<string, Word>;
-export type Part = keyof typeof PARTS;
+    weeded: { ground: "groundWeeded", left: "leftSwings" },
+    plants: { ground: "groundPlants", left: "leftPlants" },
+    margins: { ground: "groundMargins", left: "leftPlants" },
+    weeds: { ground: "groundWeeds", left: "leftWeeds" },
+    swings: { ground: "groundSwings", left: "leftSwings" },
+    closed: { ground: "groundClosed", left: "leftClosed" },
+} as const;
+type Part = keyof typeof PARTS;
 
-/** Why a tall weed was left, by the part of its ground, and why a plant was not kept. */
-const LEFT = {
-    weeded: "leftSwings",
-    swings: "leftSwings",
-    plants: "leftPlants",
-    margins: "leftPlants",
-    weeds: "leftWeeds",
-    closed: "leftClosed",
-} as const satisfies Record<Part, Word>;
-const NOT_KEPT = { unseen: "notKeptUnseen", off: "notKeptOff", late: "notKeptLate" } as const satisfies Record<
-    string,
-    Word
->;
+/** Why a plant was not kept. */
+const NOT_KEPT = { unseen: "notKeptUnseen", off: "notKeptOff", late: "notKeptLate" } as const;
 export type NotKept = keyof typeof NOT_KEPT;
 
 /** Tolerance of a zone's position: the encoder's count, and the beam's. */
@@ -105,11 +94,11 @@ export function groundInWords(groundMm: Readonly<Record<Part, number>>): string 
     const allMm = parts.reduce((sum, part) => sum + groundMm[part], 0);
     if (allMm < 1) return "";
     const share = (part: Part) => quantity((100 * groundMm[part]) / allMm, "percent");
-    return say("ground", { parts: parts.map((part) => say(PARTS[part], { share: share(part) })).join(", ") });
+    return say("ground", { parts: parts.map((part) => say(PARTS[part].ground, { share: share(part) })).join(", ") });
 }
 
 /** The counts of the texts in a list, the most frequent first. */
-function counted(words: readonly ((typeof LEFT)[Part] | (typeof NOT_KEPT)[NotKept])[]): string {
+function counted(words: readonly ((typeof PARTS)[Part]["left"] | (typeof NOT_KEPT)[NotKept])[]): string {
     const counts = new Map<(typeof words)[number], number>();
     for (const word of words) counts.set(word, (counts.get(word) ?? 0) + 1);
     return [...counts]
@@ -120,7 +109,8 @@ function counted(words: readonly ((typeof LEFT)[Part] | (typeof NOT_KEPT)[NotKep
 
 /** Why weeds were left and plants not kept, in words. */
 export function whyInWords(left: readonly (Part | undefined)[], notKept: readonly NotKept[]): string {
-    const weeds = left.length > 0 ? [say("left", { parts: counted(left.map((part) => LEFT[part ?? "closed"])) })] : [];
+    const weeds =
+        left.length > 0 ? [say("left", { parts: counted(left.map((part) => PARTS[part ?? "closed"].left)) })] : [];
     const plants = notKept.length > 0 ? [say("notKept", { parts: counted(notKept.map((why) => NOT_KEPT[why])) })] : [];
     return [...plants, ...weeds].join(" ");
 }

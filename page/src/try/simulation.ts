@@ -88,10 +88,11 @@ export class Simulation {
             this.zones = [];
         }
         if (happening.is === "connected" || happening.is === "settings") {
-            const margin = happening.settings.find(({ name }) => name === "margin_mm");
-            if (margin) this.outcome.marginMm = margin.value;
-            const zone = happening.settings.find(({ name }) => name === "stem_zone_mm");
-            if (zone) this.outcome.stemZoneMm = zone.value;
+            const { outcome } = this;
+            for (const { name, value } of happening.settings) {
+                if (name === "margin_mm") outcome.marginMm = value;
+                if (name === "stem_zone_mm") outcome.stemZoneMm = value;
+            }
         }
         if (happening.is === "status") {
             this.losses.isAtWork = happening.status.mode === "work";

@@ -19,7 +19,6 @@ interface State {
     readonly timerMode: number;
 }
 
-/** Adds a timer to a chip, which then calls it only when something happens. */
 export function addTimer(cpu: CPU, config: AVRTimerConfig): void {
     const timer = new AVRTimer(cpu, config);
     const { count } = timer;

@@ -23,19 +23,13 @@ const sramAtPowerUp = () => new Uint8Array(SRAM_BYTES).fill(0xc5);
 /** Cycles after which a byte that could not be taken is offered again: the shortest instruction. */
 const NEXT_INSTRUCTION = 1;
 
-/** A reset after the first power-up. */
-export interface Reset {
-    readonly cycle: number;
-    readonly cause: ResetCause;
-}
-
 export class Uno {
     /** Called when the level that the firmware drives on a pin has changed. An undriven pin counts as low. */
     onLevel: (pin: number, high: boolean, cycle: number) => void = () => {};
     /** The firmware has handed a byte to its transmitter. */
     onByte: (byte: number) => void = () => {};
     /** Resets since the first power-up, oldest first. */
-    readonly resets: Reset[] = [];
+    readonly resets: { readonly cycle: number; readonly cause: ResetCause }[] = [];
     readonly eeprom: Uint8Array;
     readonly #program: Uint16Array;
     readonly #backend: EEPROMBackend;
@@ -84,7 +78,6 @@ export class Uno {
         this.#chip.set(pin, high);
     }
 
-    /** Whether the firmware drives a pin high. */
     isHigh(pin: number): boolean {
         return this.#driven.get(pin) ?? false;
     }

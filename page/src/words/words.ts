@@ -5,21 +5,37 @@
 // by their own module.
 
 import { chosen, keep } from "../preferences.ts";
-import { en } from "./en.ts";
-import { es } from "./es.ts";
-import { fr } from "./fr.ts";
-import { hi } from "./hi.ts";
-import type { HeardWord, Holes, Language, Word } from "./language.ts";
+import * as en from "./en.ts";
+import * as es from "./es.ts";
+import * as fr from "./fr.ts";
+import * as hi from "./hi.ts";
 
-export type { Language, Plain, Word } from "./language.ts";
+export type Word = keyof typeof en.words;
+/** The keys of texts without placeholders. */
+export type Plain = { [Key in Word]: [Holes<(typeof en.words)[Key]>] extends [never] ? Key : never }[Word];
+type HeardWord = keyof typeof en.heard;
 
-/** The languages, each with its own name for itself. */
-export const LANGUAGES = {
-    en: { name: "English", table: { ...en, advice: {}, settings: {}, steps: {} } },
-    hi: { name: "हिन्दी", table: hi },
-    es: { name: "Español", table: es },
-    fr: { name: "Français", table: fr },
-} as const satisfies Readonly<Record<string, { name: string; table: Language }>>;
+/** A language's table. */
+export interface Language {
+    /** Its own name for itself. */
+    readonly name: string;
+    /** The texts of the page. */
+    readonly words: Readonly<Record<Word, string>>;
+    /** Texts that stay English until they are shown. */
+    readonly heard: Readonly<Record<HeardWord, string>>;
+    /** The advice for an alarm or a warning, by its name. In English it comes from the manual. */
+    readonly advice?: Readonly<Record<string, string>>;
+    /** The description of each setting, by its name. In English it comes from the machine. */
+    readonly settings?: Readonly<Record<string, string>>;
+    /** The steps of setting a machine up, by their titles in the manual: the title as a sentence, and how. */
+    readonly steps?: Readonly<Record<string, string>>;
+}
+
+/** The names of the holes in a text. */
+type Holes<Text extends string> = Text extends `${string}{${infer Hole}}${infer Rest}` ? Hole | Holes<Rest> : never;
+
+/** The languages. */
+export const LANGUAGES = { en, hi, es, fr } as const satisfies Readonly<Record<string, Language>>;
 export type Code = keyof typeof LANGUAGES;
 
 /** The values of a text's placeholders; empty without any. Numbers are formatted for the language. */
@@ -39,7 +55,8 @@ function preferred(): Code {
 }
 
 let code: Code = preferred();
-let table: Language = LANGUAGES[code].table;
+/** Its table. */
+export let table: Language = LANGUAGES[code];
 const changes: (() => void)[] = [];
 const formats = new Map<string, Intl.NumberFormat>();
 
@@ -48,7 +65,7 @@ export const language = (): Code => code;
 /** Chooses a language, and writes all texts again that are not updated continuously. */
 export function speak(chosen: Code): void {
     keep("language", chosen);
-    [code, table] = [chosen, LANGUAGES[chosen].table];
+    [code, table] = [chosen, LANGUAGES[chosen]];
     formats.clear();
     for (const change of changes) change();
 }
@@ -144,15 +161,6 @@ export function told(english: unknown): string {
     }
     return text;
 }
-
-/** The advice for an alarm or a warning, if the language has its own. */
-export const advice = (name: string): string | undefined => table.advice[name];
-
-/** A setting's description, if the language has its own. */
-export const settingHelp = (name: string): string | undefined => table.settings[name];
-
-/** A step of setting a machine up, from its title and its text in the manual. */
-export const step = (title: string, how: string): readonly [string, string] => table.steps[title] ?? [title, how];
 
 const shown = new Map<Element, () => string>();
 onLanguage(() => {

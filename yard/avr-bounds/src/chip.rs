@@ -63,8 +63,7 @@ impl Chip {
         if self.flash_bytes > 0x2_0000 { 3 } else { 2 }
     }
 
-    /// Cycles from the end of an instruction to the first one of the vector. Each byte of the return address takes one
-    /// cycle.
+    /// Cycles from an instruction's end to the vector's first one. Each byte of the return address takes one.
     pub(crate) fn response_cycles(&self) -> u64 {
         2 + self.return_address_bytes() as u64
     }

@@ -40,8 +40,7 @@ pub(crate) fn turns(nodes: &[Node], circle: &BTreeSet<usize>, head: usize) -> Op
     exits.filter_map(|exit| Some(counted.by(exit)?.0)).min()
 }
 
-/// The edges out of a loop behind which this register is zero, because the loop counts with it. `circle` may have several
-/// entries, but no loop within it.
+/// The edges out of a loop that counts with this register down to zero. `circle` may have several entries.
 pub(crate) fn exits_with_zero(nodes: &[Node], circle: &BTreeSet<usize>, register: usize) -> Vec<(usize, usize)> {
     let edges = |node: usize| -> Vec<usize> { nodes[node].edges.iter().map(|edge| edge.to).collect() };
     let entries: Vec<&Edge> = entering(nodes, circle).collect();
@@ -69,7 +68,7 @@ pub(crate) fn exits_with_zero(nodes: &[Node], circle: &BTreeSet<usize>, register
         let ordered: Vec<usize> = circles(&others, &edges).into_iter().flatten().chain([exit]).collect();
         let counted = Loop { nodes, circle, ordered: &ordered, entries: &entries, runs_once: &passes };
         let (_, needed, ends) = counted.by(exit)?;
-        let is_zero = needed.contains(register) && ends.iter().all(|end| end.registers[register] == 0);
+        let is_zero = needed.has(register) && ends.iter().all(|end| end.registers[register] == 0);
         is_zero.then_some((exit, out))
     };
     circle.iter().filter_map(of_exit).collect()
@@ -95,8 +94,7 @@ impl Loop<'_> {
         (!is_entry && before.next().is_none()).then_some(only)
     }
 
-    /// The number of returns to the loop's head by the branch at `exit`, the registers that decide it, and their values
-    /// at the end for each entry.
+    /// The returns to the loop's head by the branch at `exit`, the registers that decide it, and how each entry ends.
     fn by(&self, exit: usize) -> Option<(u64, Registers, Vec<Concrete>)> {
         let branch = self.nodes[exit].instruction;
         if !matches!(branch.operation, Brbs | Brbc | Cpse | Sbrc | Sbrs) {
@@ -115,9 +113,9 @@ impl Loop<'_> {
                     }
                     let effects = self.nodes[node].instruction.effects();
                     if !(effects.changes & flags).is_empty() {
-                        flags = flags - effects.changes;
+                        flags -= effects.changes;
                         slice.insert(node);
-                        needed = needed | (effects.reads - Registers::FLAGS);
+                        needed |= effects.reads - Registers::FLAGS;
                         flags_of.push((node, effects.reads & Registers::FLAGS));
                     }
                 }
@@ -131,7 +129,7 @@ impl Loop<'_> {
                     return None;
                 }
                 if !(effects.changes & needed).is_empty() && slice.insert(node) {
-                    needed = needed | (effects.reads - Registers::FLAGS);
+                    needed |= effects.reads - Registers::FLAGS;
                     flags_of.push((node, effects.reads & Registers::FLAGS));
                 }
             }
@@ -148,7 +146,7 @@ impl Loop<'_> {
         let stays_when_next = self.nodes[stays.to].place.address == branch.next();
         let (mut most, mut ends) = (0, Vec::new());
         for Edge { constants, .. } in self.entries {
-            if !needed.iter().all(|register| constants[register].is_some()) {
+            if !needed.numbers().all(|register| constants[register].is_some()) {
                 return None;
             }
             let registers = constants.map(Option::unwrap_or_default);
@@ -172,7 +170,7 @@ fn run(
     let mut before = held.clone();
     for turn in 0..MOST_TURNS {
         // If a state repeats, the loop never ends.
-        if turn > 0 && needed.iter().all(|register| held.registers[register] == before.registers[register]) {
+        if turn > 0 && needed.numbers().all(|register| held.registers[register] == before.registers[register]) {
             return None;
         }
         if turn.is_power_of_two() {
@@ -201,7 +199,7 @@ fn run(
 fn moves_pointer(step: &Instruction, held: &mut Concrete, needed: Registers) -> bool {
     let Some((pointer, by)) = step.pointer() else { return false };
     let is_load = matches!(step.operation, Ld | Lpm | Elpm);
-    if by == 0 || is_load && needed.contains(step.destination) {
+    if by == 0 || is_load && needed.has(step.destination) {
         return false;
     }
     let address = u16::from_le_bytes([held.registers[pointer], held.registers[pointer + 1]]);

@@ -3,11 +3,9 @@
 //! A path's length is the sum of its instructions' cycles, with the called functions. For a loop, the longest path of
 //! one turn is found first, from the loop's head back to it. It is multiplied by the loop bound. Inner loops are
 //! calculated before outer loops. A loop bound comes from the source or a table ([`crate::loops`]), or is counted
-//! (`counted`). Without a bound the loop is taken once, and its head is kept in the result. Such a result is no bound
-//! ([`Time::is_bound`]).
+//! (`counted`). Without a bound the loop is taken once, and its head is kept in the result. Such a result is no bound.
 //!
-//! Paths that never end are left out. For example, a loop that waits for the watchdog's reset adds no time to a
-//! routine.
+//! Paths that never end are left out, such as a loop that waits for the watchdog's reset.
 
 use crate::counted;
 use crate::paths::{circles, entering, loops, reaching, runs_once};
@@ -27,11 +25,6 @@ pub(crate) struct Time {
 impl Time {
     pub(crate) fn of(cycles: u64) -> Time {
         Time { cycles, unbounded: BTreeSet::new() }
-    }
-
-    /// Whether it is a bound.
-    pub(crate) fn is_bound(&self) -> bool {
-        self.unbounded.is_empty()
     }
 
     pub(crate) fn and(&self, other: &Time) -> Time {
@@ -58,8 +51,7 @@ pub(crate) fn longer(one: Option<Time>, other: Option<Time>) -> Option<Time> {
 pub(crate) struct Passes {
     /// By addresses in loops: the most executions of the address for each entry to the loop.
     pub(crate) stated: BTreeMap<u32, u64>,
-    /// By addresses where loops may begin: the bounds for the outermost loop of a function and for each depth within
-    /// it.
+    /// By addresses where loops may begin: the bounds of the outermost loop and of each depth within it.
     pub(crate) of_heads: BTreeMap<u32, Vec<u64>>,
     /// Entries of functions with a single loop, which turns once for each byte of a length, and once more.
     pub(crate) by_length: BTreeSet<u32>,
@@ -70,8 +62,7 @@ pub(crate) struct Passes {
 pub(crate) enum Stretch {
     /// From the end of the instruction that clears the interrupt flag to the end of the one that sets it.
     FlagClear,
-    /// From one moment at which an interrupt can be served to the next. It includes one instruction before and one
-    /// after.
+    /// From one moment at which an interrupt can be served to the next, with one instruction before and one after.
     Closed,
 }
 
@@ -96,9 +87,9 @@ enum Count {
     Own,
 }
 
-/// The stretches of a routine.
+/// The longest stretches of a routine; `None` where it has none.
 #[derive(Clone, Debug, Default)]
-struct Stretches {
+pub(crate) struct Stretches {
     /// From the entry to a return, completely without interrupts.
     through: Option<Time>,
     /// From the entry to the first moment with interrupts.
@@ -106,7 +97,7 @@ struct Stretches {
     /// From the last moment with interrupts to a return.
     last: Option<Time>,
     /// From one moment with interrupts to the next.
-    inner: Option<Time>,
+    pub(crate) inner: Option<Time>,
 }
 
 /// Times routines, each once.
@@ -126,48 +117,42 @@ impl Timer {
         if let Some(known) = self.longest.get(&std::ptr::from_ref(routine)) {
             return known.clone();
         }
-        let returning = reaching(&routine.nodes, |node| routine.nodes[node].returns.is_some());
-        let times = self.times(&routine.nodes, &|node| returning[node], vec![(0, Time::default())], Count::Whole);
-        let time = ends(&routine.nodes, &times);
+        let nodes = &routine.nodes;
+        let returning = reaching(nodes, |node| nodes[node].returns.is_some());
+        let times = self.times(nodes, &|node| returning[node], vec![(0, Time::default())], Count::Whole);
+        let time = ends(nodes, &times);
         self.longest.insert(routine, time.clone());
         time
     }
 
-    /// The longest paths from a routine's entry to the end of each of some places, and from there to the end of a
-    /// return.
+    /// The longest paths from a routine's entry to the end of some places, and from there to the end of a return.
     pub(crate) fn around(&mut self, routine: &Routine, is_place: impl Fn(&Node) -> bool) -> Option<(Time, Time)> {
-        let returning = reaching(&routine.nodes, |node| routine.nodes[node].returns.is_some());
-        let before = self.times(&routine.nodes, &|node| returning[node], vec![(0, Time::default())], Count::Whole);
-        let places: Vec<usize> = (0..routine.nodes.len()).filter(|&node| is_place(&routine.nodes[node])).collect();
+        let nodes = &routine.nodes;
+        let returning = reaching(nodes, |node| nodes[node].returns.is_some());
+        let begin = || vec![(0, Time::default())];
+        let before = self.times(nodes, &|node| returning[node], begin(), Count::Whole);
+        let places: Vec<usize> = (0..nodes.len()).filter(|&node| is_place(&nodes[node])).collect();
         let (mut to, mut behind) = (None, Vec::new());
         for &place in &places {
-            for edge in &routine.nodes[place].edges {
+            for edge in &nodes[place].edges {
                 to = longer(to, before[place].as_ref().map(|time| time.and_cycles(edge.cycles)));
                 behind.push((edge.to, Time::default()));
             }
         }
-        let after = self.times(&routine.nodes, &|node| returning[node], behind, Count::Whole);
+        let after = self.times(nodes, &|node| returning[node], behind, Count::Whole);
         let is_passed_again = places.iter().any(|&place| after[place].is_some());
         // Every path must pass one of the places.
-        let others = self.times(
-            &routine.nodes,
-            &|node| returning[node] && !places.contains(&node),
-            vec![(0, Time::default())],
-            Count::Whole,
-        );
-        let is_passed_by = ends(&routine.nodes, &others).is_some() && !places.contains(&0);
+        let is_other = |node| returning[node] && !places.contains(&node);
+        let others = self.times(nodes, &is_other, begin(), Count::Whole);
+        let is_passed_by = ends(nodes, &others).is_some() && !places.contains(&0);
         if is_passed_again || is_passed_by {
             return None;
         }
-        Some((to?, ends(&routine.nodes, &after)?))
+        Some((to?, ends(nodes, &after)?))
     }
 
-    /// The longest stretch in a routine and in the functions that it calls; `None` if there is none.
-    pub(crate) fn longest_stretch(&mut self, routine: &Routine, kind: Stretch) -> Option<Time> {
-        self.stretches(routine, kind).inner
-    }
-
-    fn stretches(&mut self, routine: &Routine, kind: Stretch) -> Stretches {
+    /// The stretches in a routine and in the functions that it calls.
+    pub(crate) fn stretches(&mut self, routine: &Routine, kind: Stretch) -> Stretches {
         let key = (std::ptr::from_ref(routine), kind);
         if let Some(known) = self.stretches.get(&key) {
             return known.clone();
@@ -243,8 +228,7 @@ impl Timer {
         (to_return, to_open)
     }
 
-    /// The longest turn of the endless loop that feeds the watchdog: from one `is_fed` to the next. `None` if the
-    /// routine has no such loop.
+    /// The longest turn of a loop that feeds the watchdog: from one `is_fed` to the next. `None` without such a loop.
     pub(crate) fn turn(&mut self, routine: &Routine, is_fed: impl Fn(&Node) -> bool) -> Option<Time> {
         let nodes = &routine.nodes;
         let mut turn = None;
@@ -317,8 +301,7 @@ impl Timer {
         found
     }
 
-    /// The longest time to the beginning of each place that can be reached from the starting places, over places that
-    /// are `within`.
+    /// The longest time from the starting places to the beginning of each place, over places that are `within`.
     fn times(
         &mut self,
         nodes: &[Node],
@@ -362,8 +345,7 @@ impl Paths<'_> {
         self.nodes[node].place.address
     }
 
-    /// Propagates the times of the starting places to all others of a set at this loop depth. Ways back to `heads` are
-    /// left out.
+    /// Propagates the times of the starting places to all others of a set at this loop depth, but not back to `heads`.
     fn fill(&self, set: BTreeSet<usize>, heads: &BTreeSet<usize>, depth: usize, times: &mut [Option<Time>]) {
         let edges = |node: usize| self.edges[node].iter().filter(|(to, _)| set.contains(to) && !heads.contains(to));
         for circle in circles(&set, &|node| edges(node).map(|(to, _)| *to).collect()) {

@@ -203,8 +203,7 @@ impl Instruction {
         bits.fold(0, |operand, (_, bit)| operand << 1 | self.word >> bit & 1)
     }
 
-    /// The data address in the instruction itself: of `in`, `out` and the instructions for a bit of a register, and of
-    /// `lds` and `sts`.
+    /// The data address in the instruction itself: of `in`, `out`, `lds`, `sts`, and of those for a register's bit.
     pub(crate) fn data_address(&self) -> Option<u16> {
         /// The address of the registers for `in` and `out` in the data space (data sheet, register summary).
         const IO_START: u16 = 0x20;
@@ -221,8 +220,7 @@ impl Instruction {
         matches!(self.operation, In | Lds | Sbic | Sbis) && self.data_address() == Some(address)
     }
 
-    /// The lower register of the pointer of a load or a store, and how it moves: after the access, or before it if
-    /// negative.
+    /// The lower register of a load's or store's pointer, and how it moves: after the access, or before if negative.
     pub(crate) fn pointer(&self) -> Option<(usize, i8)> {
         Some(match (self.operation, self.word & 0xF) {
             (Ld | St, 0xC) => (X, 0),
@@ -267,21 +265,6 @@ impl Instruction {
             _ => None,
         }
     }
-
-    /// Its name, as avr-objdump writes it.
-    pub(crate) fn mnemonic(&self) -> String {
-        let bit = usize::from(self.operand('s'));
-        match self.operation {
-            Brbs => ["brcs", "breq", "brmi", "brvs", "brlt", "brhs", "brts", "brie"][bit].into(),
-            Brbc => ["brcc", "brne", "brpl", "brvc", "brge", "brhc", "brtc", "brid"][bit].into(),
-            Bset => ["sec", "sez", "sen", "sev", "ses", "seh", "set", "sei"][bit].into(),
-            Bclr => ["clc", "clz", "cln", "clv", "cls", "clh", "clt", "cli"][bit].into(),
-            // Without a displacement it has the shorter name.
-            Ldd if self.operand('q') == 0 => "ld".into(),
-            Std if self.operand('q') == 0 => "st".into(),
-            other => format!("{other:?}").to_lowercase(),
-        }
-    }
 }
 
 #[cfg(test)]
@@ -292,6 +275,21 @@ mod tests {
     /// Instructions of the XMEGA only, and words that are no instruction.
     const LACKING: [&str; 6] = [".word", "des", "xch", "las", "lac", "lat"];
     const SPM_WITH_INCREMENT: u32 = 0x95F8;
+
+    /// An instruction's name, as avr-objdump writes it.
+    fn mnemonic(found: &Instruction) -> String {
+        let bit = usize::from(found.operand('s'));
+        match found.operation {
+            Brbs => ["brcs", "breq", "brmi", "brvs", "brlt", "brhs", "brts", "brie"][bit].into(),
+            Brbc => ["brcc", "brne", "brpl", "brvc", "brge", "brhc", "brtc", "brid"][bit].into(),
+            Bset => ["sec", "sez", "sen", "sev", "ses", "seh", "set", "sei"][bit].into(),
+            Bclr => ["clc", "clz", "cln", "clv", "cls", "clh", "clt", "cli"][bit].into(),
+            // Without a displacement it has the shorter name.
+            Ldd if found.operand('q') == 0 => "ld".into(),
+            Std if found.operand('q') == 0 => "st".into(),
+            other => format!("{other:?}").to_lowercase(),
+        }
+    }
 
     #[test]
     fn every_word_is_decoded_as_by_avr_objdump() {
@@ -311,7 +309,7 @@ mod tests {
         };
         let mut seen = 0;
         for (address, length, name) in text.lines().filter_map(line).filter(|(address, ..)| address % 4 == 0) {
-            let found = Instruction::at(&words, address).map(|found| (found.bytes(), found.mnemonic()));
+            let found = Instruction::at(&words, address).map(|found| (found.bytes(), mnemonic(&found)));
             let word = address / 4;
             let expected = Some((length, name))
                 .filter(|(_, name)| !LACKING.contains(&name.as_str()) && word != SPM_WITH_INCREMENT);

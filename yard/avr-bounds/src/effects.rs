@@ -6,84 +6,55 @@
 use crate::decode::Instruction;
 use crate::decode::Operation::*;
 use std::fmt;
-use std::ops;
-
-/// A set of registers and flags: registers by their number, then flags by their bit in SREG.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Registers(u64);
 
 /// The number of registers; the flags follow them.
 const REGISTERS: usize = 32;
 
-impl Registers {
-    pub(crate) const NONE: Registers = Registers(0);
-    /// The registers that functions preserve (AVR calling convention): R2 to R17, R28 and R29.
-    pub(crate) const PRESERVED: Registers = Registers(0x3003_FFFC);
-    /// The pair that a multiplication's product is in.
-    const PRODUCT: Registers = Registers(0b11);
-    /// All flags but the interrupts'.
-    pub(crate) const FLAGS: Registers = flags(0b0111_1111);
-    pub(crate) const ZERO_FLAG: Registers = Z;
-    pub(crate) const CARRY_FLAG: Registers = C;
-    /// All registers and flags.
-    pub(crate) const ALL: Registers = Registers(Registers::FLAGS.0 | ((1 << REGISTERS) - 1));
+bitflags::bitflags! {
+    /// A set of registers and flags: registers by their number, then flags by their bit in SREG.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub(crate) struct Registers: u64 {
+        /// The registers that functions preserve (AVR calling convention): R2 to R17, R28 and R29.
+        const PRESERVED = 0x3003_FFFC;
+        /// The pair that a multiplication's product is in.
+        const PRODUCT = 0b11;
+        /// All flags but the interrupts'.
+        const FLAGS = 0b0111_1111 << REGISTERS;
+        const ZERO_FLAG = Z.bits();
+        const CARRY_FLAG = C.bits();
+        /// All registers and flags.
+        const ALL = Self::FLAGS.bits() | ((1 << REGISTERS) - 1);
+    }
+}
 
+impl Registers {
     pub(crate) fn one(register: usize) -> Registers {
-        Registers(1 << register)
+        Registers::from_bits_retain(1 << register)
     }
 
     fn pair(lower: usize) -> Registers {
-        Registers(0b11 << lower)
+        Registers::from_bits_retain(0b11 << lower)
     }
 
-    pub(crate) fn contains(self, register: usize) -> bool {
-        self.0 >> register & 1 == 1
+    pub(crate) fn has(self, register: usize) -> bool {
+        self.intersects(Registers::one(register))
     }
 
-    pub(crate) fn is_empty(self) -> bool {
-        self.0 == 0
-    }
-
-    /// Its registers and flags, one after the other.
-    pub(crate) fn iter(self) -> impl Iterator<Item = usize> {
-        (0..REGISTERS + 7).filter(move |&register| self.contains(register))
+    /// Its registers and flags, by their numbers.
+    pub(crate) fn numbers(self) -> impl Iterator<Item = usize> {
+        (0..REGISTERS + 7).filter(move |&register| self.has(register))
     }
 
     /// Every register for which that holds.
     pub(crate) fn which(holds: impl Fn(usize) -> bool) -> Registers {
-        let registers = (0..REGISTERS).filter(|&register| holds(register));
-        registers.fold(Registers::NONE, |all, register| all | Registers::one(register))
-    }
-}
-
-impl ops::BitOr for Registers {
-    type Output = Registers;
-
-    fn bitor(self, other: Registers) -> Registers {
-        Registers(self.0 | other.0)
-    }
-}
-
-impl ops::BitAnd for Registers {
-    type Output = Registers;
-
-    fn bitand(self, other: Registers) -> Registers {
-        Registers(self.0 & other.0)
-    }
-}
-
-impl ops::Sub for Registers {
-    type Output = Registers;
-
-    fn sub(self, other: Registers) -> Registers {
-        Registers(self.0 & !other.0)
+        (0..REGISTERS).filter(|&register| holds(register)).map(Registers::one).collect()
     }
 }
 
 /// Names: `r5, r6`, and a flag by its letter.
 impl fmt::Display for Registers {
     fn fmt(&self, to: &mut fmt::Formatter) -> fmt::Result {
-        let names = self.iter().map(|register| match register.checked_sub(REGISTERS) {
+        let names = self.numbers().map(|register| match register.checked_sub(REGISTERS) {
             None => format!("r{register}"),
             Some(flag) => format!("flag {}", char::from(b"CZNVSHT"[flag])),
         });
@@ -93,7 +64,7 @@ impl fmt::Display for Registers {
 
 /// The flags with these bits in SREG.
 const fn flags(bits: u64) -> Registers {
-    Registers(bits << REGISTERS)
+    Registers::from_bits_retain(bits << REGISTERS)
 }
 
 // Flags by their bit in SREG, and the flags that each kind of instruction changes.
@@ -119,13 +90,12 @@ impl Instruction {
         let (d, r) = (self.destination, self.source);
         let (to, from) = (R::one(d), R::one(r));
         let flag = flags(1 << self.operand('s')) & R::FLAGS;
-        let pointer = self.pointer().map_or(R::NONE, |(pointer, _)| R::pair(pointer));
-        let moved = if self.pointer().is_some_and(|(_, by)| by != 0) { pointer } else { R::NONE };
-        // Subtracting a register from itself, or XOR with itself, gives 0 or a value made from the carry. The old value
-        // does not matter.
+        let pointer = self.pointer().map_or(R::empty(), |(pointer, _)| R::pair(pointer));
+        let moved = if self.pointer().is_some_and(|(_, by)| by != 0) { pointer } else { R::empty() };
+        // A register minus itself, or XOR itself, is 0 or made from the carry. The old value does not matter.
         let is_same = d == r;
         let (reads, changes) = match self.operation {
-            Sub | Eor if is_same => (R::NONE, to | if self.operation == Sub { HSVNZC } else { SVNZ }),
+            Sub | Eor if is_same => (R::empty(), to | if self.operation == Sub { HSVNZC } else { SVNZ }),
             Sbc if is_same => (C | Z, to | HSVNZC),
             Add | Sub => (to | from, to | HSVNZC),
             Adc => (to | from | C, to | HSVNZC),
@@ -144,24 +114,24 @@ impl Instruction {
             Swap => (to, to),
             Mov => (from, to),
             Movw => (R::pair(r), R::pair(d)),
-            Ldi => (R::NONE, to),
+            Ldi => (R::empty(), to),
             Bst => (to, T),
             Bld => (to | T, to),
-            Bset | Bclr => (R::NONE, flag),
-            Brbs | Brbc => (flag, R::NONE),
-            Cpse => (to | from, R::NONE),
-            Sbrc | Sbrs => (from, R::NONE),
+            Bset | Bclr => (R::empty(), flag),
+            Brbs | Brbc => (flag, R::empty()),
+            Cpse => (to | from, R::empty()),
+            Sbrc | Sbrs => (from, R::empty()),
             // Functions read SREG for its interrupt flag, handlers to restore it; another analysis follows this.
-            In | Lds => (R::NONE, to),
-            Out | Sts => (from, R::NONE),
+            In | Lds => (R::empty(), to),
+            Out | Sts => (from, R::empty()),
             Ld | Ldd => (pointer, to | moved),
             Lpm | Elpm => (pointer, to | moved),
             St | Std => (pointer | from, moved),
             // Another analysis follows the stack.
-            Push => (R::NONE, R::NONE),
-            Pop => (R::NONE, to),
+            Push => (R::empty(), R::empty()),
+            Pop => (R::empty(), to),
             Break | Call | Cbi | Eicall | Eijmp | Icall | Ijmp | Jmp | Nop | Rcall | Ret | Reti | Rjmp | Sbi | Sbic
-            | Sbis | Sleep | Spm | Wdr => (R::NONE, R::NONE),
+            | Sbis | Sleep | Spm | Wdr => (R::empty(), R::empty()),
         };
         Effects { reads, changes }
     }
@@ -221,8 +191,7 @@ mod tests {
         }
     }
 
-    /// Random registers and flags. Pointers lead into SRAM, and stay further from its ends than the largest
-    /// displacement.
+    /// Random registers and flags. Pointers lead into SRAM, with room for the largest displacement.
     fn any_contents(random: &mut ChaCha8Rng) -> Contents {
         std::array::from_fn(|register| match register {
             27 | 29 | 31 => random.random_range(2..6),
@@ -249,7 +218,7 @@ mod tests {
             else {
                 continue;
             };
-            let Effects { reads, changes } = instruction.effects();
+            let (name, Effects { reads, changes }) = (instruction.operation, instruction.effects());
             let is_store = matches!(instruction.operation, St | Std | Sts);
             let is_harmless_input = instruction.operation != In || instruction.data_address() == Some(GPIOR0);
             // The others act on the stack or the control flow, or on what is no register.
@@ -260,14 +229,8 @@ mod tests {
             for _ in 0..4 {
                 let before = any_contents(&mut random);
                 let behind = chip.run([word, ADDRESS], &before);
-                for place in (Registers::ALL - changes).iter() {
-                    assert_eq!(
-                        behind[place],
-                        before[place],
-                        "{} changes {}",
-                        instruction.mnemonic(),
-                        Registers::one(place)
-                    );
+                for place in (Registers::ALL - changes).numbers() {
+                    assert_eq!(behind[place], before[place], "{name:?} changes {}", Registers::one(place));
                 }
                 let mut concrete = Concrete { registers: [0; 32], status: 0 };
                 concrete.registers.copy_from_slice(&before[..REGISTERS]);
@@ -276,21 +239,14 @@ mod tests {
                     computed += 1;
                     let flags = (0..7).map(|flag| concrete.status >> flag & 1);
                     let all: Vec<u8> = concrete.registers.into_iter().chain(flags).collect();
-                    assert_eq!(all, behind, "{} from {before:?}", instruction.mnemonic());
+                    assert_eq!(all, behind, "{name:?} from {before:?}");
                 }
                 // Unread registers get other values.
                 let other = any_contents(&mut random);
-                let other =
-                    std::array::from_fn(|place| if reads.contains(place) { before[place] } else { other[place] });
+                let other = std::array::from_fn(|place| if reads.has(place) { before[place] } else { other[place] });
                 let behind_other = chip.run([word, ADDRESS], &other);
-                for place in changes.iter() {
-                    assert_eq!(
-                        behind_other[place],
-                        behind[place],
-                        "{} reads more for {}",
-                        instruction.mnemonic(),
-                        Registers::one(place)
-                    );
+                for place in changes.numbers() {
+                    assert_eq!(behind_other[place], behind[place], "{name:?} reads more for {}", Registers::one(place));
                 }
             }
         }

@@ -1,5 +1,4 @@
-//! Reads an ELF: the bytes in flash and of initialised variables, the functions, the chip, and the program's records of
-//! loop bounds.
+//! Reads an ELF: flash, initialised variables, functions, the chip, and the program's records of loop bounds.
 
 use crate::chip::{CHIPS, Chip};
 use crate::error::BoundsError;
@@ -70,6 +69,8 @@ pub struct Program {
     pub records: BTreeMap<u32, u64>,
     /// Every symbol in flash by its raw name.
     pub(crate) labels: BTreeMap<String, u32>,
+    /// Entries of libgcc's routines that jump through a table.
+    pub(crate) table_jumps: BTreeSet<u32>,
     /// Addresses of symbols in a section of code, of any type but data's.
     pub(crate) marked: BTreeSet<u32>,
     /// Data in flash, by symbols that have its type and size.
@@ -163,6 +164,8 @@ impl Program {
         let in_flash = || file.symbols().filter(|symbol| symbol.address() < u64::from(SRAM_ORIGIN));
         let labels: BTreeMap<String, u32> =
             in_flash().filter_map(|symbol| Some((symbol.name().ok()?.to_owned(), symbol.address() as u32))).collect();
+        let table_jumps = labels.iter().filter(|(name, _)| name.starts_with("__tablejump"));
+        let table_jumps = table_jumps.map(|(_, address)| *address).collect();
         let of_code = || in_flash().filter(|symbol| is_in_code(&file, symbol));
         let is_mark =
             |symbol: &ElfSymbol32<LittleEndian>| matches!(symbol.kind(), SymbolKind::Text | SymbolKind::Unknown);
@@ -171,8 +174,7 @@ impl Program {
             let first = symbol.address() as u32;
             first..first + size_of(&symbol, code_end)
         });
-        let objects = objects.collect();
-        let tables: Vec<Range<usize>> = (file.symbols())
+        let virtual_tables = (file.symbols())
             .filter(|symbol| symbol.name().is_ok_and(|name| name.starts_with("_ZTV")))
             .filter_map(|symbol| {
                 let first = symbol.address().checked_sub(data_start.into())?;
@@ -184,22 +186,21 @@ impl Program {
         let start = if start == u32::MAX { 0 } else { start };
         let has_vectors = start == 0 || labels.get("__vectors") == Some(&start);
         let records = loops::records_of(&file).map_err(not_elf)?;
-        let functions = functions(&file, code_end);
-        let relocations = relocations(&file);
         Ok(Program {
             chip,
             flash,
             start,
             has_vectors,
-            functions,
-            relocations,
+            functions: functions(&file, code_end),
+            relocations: relocations(&file),
             labels,
+            table_jumps,
             marked,
-            objects,
+            objects: objects.collect(),
             code_end,
             data_start,
             data,
-            virtual_tables: tables,
+            virtual_tables,
             records,
             path: path.into(),
             debug_information: OnceCell::new(),

@@ -1,20 +1,12 @@
 //! The error of the analysis: the reason why no proof was possible, the address, and what to write in the budgets.
 
 use crate::proved::Place;
-use std::fmt;
 
-/// Why no proof was possible, in words for the user.
-#[derive(Debug)]
+/// Why no proof was possible, in words for the user. Names and lines come from files, so their control characters are
+/// not printed as such.
+#[derive(Debug, thiserror::Error)]
+#[error("{}", printable(.0))]
 pub struct BoundsError(pub(crate) String);
-
-impl std::error::Error for BoundsError {}
-
-/// Names and lines come from files, so their control characters are not printed as such.
-impl fmt::Display for BoundsError {
-    fn fmt(&self, to: &mut fmt::Formatter) -> fmt::Result {
-        to.write_str(&printable(&self.0))
-    }
-}
 
 /// A text whose control characters, except line ends, are written as escapes.
 pub(crate) fn printable(text: &str) -> String {

@@ -1,5 +1,4 @@
-//! The control flow of a program: its calls and paths, the depth of the stack on each path, and whether interrupts are
-//! on.
+//! The control flow of a program: its calls and paths, with the stack and the state of the interrupts on each.
 //!
 //! A [`Routine`] has one entry, with interrupts on or off: a function, a handler, or the program after a reset. From
 //! its entry every path is followed to its ends. A place on a path consists of an address, the bytes on the stack, and
@@ -29,12 +28,11 @@ use crate::proved::{self, Found, Frame};
 use crate::reach::Reach;
 use crate::routine::{Edge, Entry, Kind, Node, Place, Routine, bytes};
 use crate::targets::{Targets, Where};
-use crate::values::{DEEPEST, INTERRUPT_FLAG, Interrupts, Known, Value, turn};
+use crate::values::{DEEPEST, INTERRUPT_FLAG, Interrupts, Known, Value};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::rc::Rc;
 
-/// The EEPROM control register's bits that start a read and a write, and for how many cycles they halt the core (data
-/// sheets, EEPROM data memory).
+/// EECR's bits that start a read and a write, and how long they halt the core (data sheets, EEPROM data memory).
 const EERE: u16 = 0;
 const EEPE: u16 = 1;
 const READ_HALT_CYCLES: u32 = 4;
@@ -198,7 +196,6 @@ impl<'a> Code<'a> {
 #[derive(Clone)]
 struct After {
     known: Known,
-    interrupts: Interrupts,
     cycles: u32,
 }
 
@@ -215,7 +212,7 @@ struct Follower<'p, 'a> {
 impl Follower<'_, '_> {
     fn follow(mut self) -> Result<Routine, BoundsError> {
         let Entry { address, interrupts, kind, .. } = self.routine.entry;
-        self.reach(Place { address, depth: 0, interrupts }, Known::at_entry(kind == Kind::Function))?;
+        self.reach(address, Known::at_entry(kind == Kind::Function, interrupts))?;
         while let Some(number) = self.to_do.pop() {
             self.step(number)?;
         }
@@ -242,8 +239,8 @@ impl Follower<'_, '_> {
             let node = &nodes[number];
             for edge in &node.edges {
                 let keeps = match &edge.through {
-                    Some(called) => called.keeps.contains(ZERO) || called.leaves_zero,
-                    None => !node.instruction.effects().changes.contains(ZERO),
+                    Some(called) => called.keeps.has(ZERO) || called.leaves_zero,
+                    None => !node.instruction.effects().changes.has(ZERO),
                 };
                 let comes_zero =
                     edge.constants[ZERO] == Some(0) || is_zero[number] && keeps || exits.contains(&(number, edge.to));
@@ -255,13 +252,14 @@ impl Follower<'_, '_> {
         nodes.iter().zip(is_zero).all(|(node, is_zero)| node.returns.is_none() || is_zero)
     }
 
-    /// The number of a place that a path reaches with these facts. If they are new, the place is to be followed.
-    fn reach(&mut self, place: Place, known: Known) -> Result<usize, BoundsError> {
+    /// The number of the place that a path reaches with these facts. If they are new, the place is to be followed.
+    fn reach(&mut self, address: u32, known: Known) -> Result<usize, BoundsError> {
+        let place = Place { address, depth: known.stack.len(), interrupts: known.interrupts };
         let number = match self.numbers.get(&place) {
             Some(&number) if !self.known[number].meet(&known) => return Ok(number),
             Some(&number) => number,
             None => {
-                self.routine.nodes.push(Node::new(place, self.program.instruction(place.address)?));
+                self.routine.nodes.push(Node::new(place, self.program.instruction(address)?));
                 self.known.push(known);
                 self.numbers.insert(place, self.known.len() - 1);
                 self.known.len() - 1
@@ -308,15 +306,17 @@ impl Follower<'_, '_> {
         }
         let cycles =
             instruction.cycles + chip.more_cycles(instruction.operation) + halt_cycles(&instruction, chip.eecr);
-        let interrupts = match place.interrupts {
-            Interrupts::Off => Interrupts::Off,
-            Interrupts::Soon | Interrupts::On => Interrupts::On,
-        };
-        let mut after = After { known, interrupts, cycles };
+        if known.interrupts == Interrupts::Soon {
+            known.interrupts = Interrupts::On;
+        }
+        let interrupts = known.interrupts;
+        let mut after = After { known, cycles };
         self.routine.nodes[number] = Node::new(place, instruction);
         let (next, target) = (instruction.next(), instruction.target(chip.flash_bytes));
         match instruction.operation {
-            Rjmp | Jmp | Rcall | Call if target.is_some_and(|target| self.program.targets.is_table_jump(target)) => {
+            Rjmp | Jmp | Rcall | Call
+                if target.is_some_and(|target| self.program.elf.table_jumps.contains(&target)) =>
+            {
                 let targets = self.program.targets.of_table(self.program.elf, at, &after.known);
                 let (targets, table_cycles) = targets.ok_or_else(|| self.program.refuse(at, Problem::Indirect))?;
                 // The routine changes R0 and the pointer.
@@ -377,29 +377,34 @@ impl Follower<'_, '_> {
                     return Err(self.program.refuse(at, Problem::WrongReturn));
                 }
                 let holds = |register: usize| after.known.registers[register] == Value::AtEntry(register);
-                *keeps = *keeps & (Registers::which(holds) | after.known.unchanged);
+                *keeps &= Registers::which(holds) | after.known.unchanged;
                 *leaves_zero &= after.known.constant(1) == Some(0);
                 self.routine.returns.insert(interrupts);
                 self.routine.nodes[number].returns = Some(cycles);
             }
             _ => {
                 let Entry { kind, interrupts: at_entry, .. } = self.routine.entry;
-                let After { known, interrupts: now, .. } = &mut after;
+                let known = &mut after.known;
                 if let Some(depth) = known.starts_again(&instruction, &chip) {
-                    let place = Place { address: next, depth, interrupts: *now };
+                    let place = Place { address: next, depth, interrupts };
                     self.program.restarts.insert(place);
                     return Ok(());
                 }
-                match known.carry_out(&instruction, &chip, place.interrupts, now, kind == Kind::Reset) {
+                match known.carry_out(&instruction, &chip, kind == Kind::Reset) {
                     // The value is unknown, so interrupts can be on or off.
                     Err(Problem::UnknownStatus) if kind != Kind::Handler => {
-                        turn(now, true);
-                        self.go(number, next, After { interrupts: Interrupts::Off, ..after.clone() }, None)?;
+                        let mut off = after.clone();
+                        off.known.interrupts = Interrupts::Off;
+                        self.go(number, next, off, None)?;
+                        after.known.turn_interrupts(true);
                     }
                     Ok(()) => {}
                     Err(problem) => return Err(self.program.refuse(at, problem)),
                 }
-                if interrupts == Interrupts::Off && after.interrupts != Interrupts::Off && at_entry == Interrupts::Off {
+                if interrupts == Interrupts::Off
+                    && after.known.interrupts != Interrupts::Off
+                    && at_entry == Interrupts::Off
+                {
                     self.routine.enables.get_or_insert(at);
                 }
                 // A sleep with interrupts off does not end, and the time of a write to flash is unknown.
@@ -418,10 +423,10 @@ impl Follower<'_, '_> {
         if self.is_other_program(address) {
             return Ok(());
         }
-        let After { mut known, interrupts, cycles } = after;
+        let After { mut known, cycles } = after;
         known.restarts |= address == self.program.elf.start;
         let (length, constants) = (self.known[from].pair(20), known.constants());
-        let to = self.reach(Place { address, depth: known.stack.len(), interrupts }, known)?;
+        let to = self.reach(address, known)?;
         self.routine.nodes[from].edges.push(Edge { to, cycles, through, length, constants });
         Ok(())
     }
@@ -450,7 +455,7 @@ impl Follower<'_, '_> {
     /// Calls a function and continues after it.
     fn call(&mut self, from: usize, address: u32, mut after: After) -> Result<(), BoundsError> {
         let Entry { interrupts: at_entry, active, .. } = self.routine.entry;
-        let interrupts = after.interrupts;
+        let interrupts = after.known.interrupts;
         if self.is_other_program(address) {
             return Ok(());
         }
@@ -466,12 +471,13 @@ impl Follower<'_, '_> {
         after.known.after(called.keeps);
         after.known.kept = [Value::Unknown; 3];
         // The calling convention, which is checked at the function's return.
-        if called.leaves_zero && !called.keeps.contains(1) {
+        if called.leaves_zero && !called.keeps.has(1) {
             after.known.registers[1] = Value::Constant(0);
         }
         let next = self.routine.nodes[from].instruction.next();
         for &interrupts in &called.returns {
-            self.go(from, next, After { interrupts, ..after.clone() }, Some(Rc::clone(&called)))?;
+            after.known.interrupts = interrupts;
+            self.go(from, next, after.clone(), Some(Rc::clone(&called)))?;
         }
         if called.returns.is_empty() {
             self.routine.nodes[from].ends_in.push((after.cycles, called));
@@ -480,8 +486,7 @@ impl Follower<'_, '_> {
     }
 }
 
-/// Cycles that the EEPROM halts the core after an instruction. A write of the whole register may start either; it
-/// counts as the longer one.
+/// Cycles that the EEPROM halts the core. A write of the whole register may start either, so the longer one counts.
 fn halt_cycles(instruction: &Instruction, eecr: u16) -> u32 {
     match (instruction.operation, instruction.data_address()) {
         (Sbi, Some(address)) if address == eecr => match instruction.operand('b') {

@@ -77,8 +77,7 @@ use self::values::Interrupts;
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
-/// Additional cycles of a response in sleep (data sheets, interrupt response time), without the oscillator's start-up
-/// time.
+/// Additional cycles of a response in sleep, without the oscillator's start (data sheets, interrupt response time).
 const WAKE_UP_CYCLES: u64 = 4;
 
 /// The most cycles from an edge at a pin to its interrupt request. An edge that comes up to this time before a read may
@@ -138,7 +137,7 @@ pub fn prove(elf: &Program, budgets: &Budgets) -> Result<Bounds, BoundsError> {
     }
     let mut timer = Timer::new(passes(&code, budgets));
     let (critical_section, closed) = [Stretch::FlagClear, Stretch::Closed]
-        .map(|kind| timer.longest_stretch(&main, kind).map(|time| time.longest(&code)))
+        .map(|kind| timer.stretches(&main, kind).inner.map(|time| time.longest(&code)))
         .map(|longest| longest.unwrap_or(Longest { cycles: Some(0), without_bound: Vec::new() }))
         .into();
     let of_handlers = time_handlers(&code, &handlers, &mut timer, &closed);
@@ -193,38 +192,31 @@ fn time_handlers(
     let mut nodes = code.routines().flat_map(|routine| &routine.nodes);
     let sleeps = nodes.any(|node| node.instruction.operation == Operation::Sleep);
     let response = code.elf.chip.response_cycles() + if sleeps { WAKE_UP_CYCLES } else { 0 };
-    let mut timed: Vec<Handler> = (handlers.iter())
-        .map(|(&vector, handler)| {
-            let longest = timer.longest(handler).map(|time| time.and(&Time::of(response)).longest(code));
-            Handler {
-                vector,
-                function: code.name_of(handler.entry),
-                longest: longest.unwrap_or_default(),
-                response_cycles: None,
-                stack_bytes: code.elf.chip.return_address_bytes() + bytes(&handler.deepest),
-            }
-        })
-        .collect();
+    let longest = |(&vector, handler): (&u8, &Rc<Routine>)| {
+        let longest = timer.longest(handler).map(|time| time.and(&Time::of(response)).longest(code));
+        (vector, longest.unwrap_or_default())
+    };
+    let longest: BTreeMap<u8, Longest> = handlers.iter().map(longest).collect();
     // A handler that never returns delays no other: the program ends in it.
-    let time = |handler: &Handler| handler.longest.or_refuse("").ok();
-    let responses: Vec<Option<u64>> = (timed.iter())
-        .map(|own| {
-            let (before, behind): (Vec<&Handler>, Vec<&Handler>) =
-                timed.iter().partition(|other| other.vector < own.vector);
-            let closed = closed.cycles?;
-            let running = behind.into_iter().map(time).try_fold(0, |longest, time| Some(time?.max(longest)))?;
-            let before = before.into_iter().map(time).try_fold(0, |sum, time| Some(sum + time? + closed))?;
-            Some(running + before + closed + response)
+    let time = |longest: &Longest| longest.or_refuse("").ok();
+    let response_of = |vector: u8| {
+        let closed = closed.cycles?;
+        let running = longest.range(vector..).try_fold(0, |most, (_, other)| Some(time(other)?.max(most)))?;
+        let before = longest.range(..vector).try_fold(0, |sum, (_, other)| Some(sum + time(other)? + closed))?;
+        Some(running + before + closed + response)
+    };
+    (handlers.iter())
+        .map(|(&vector, handler)| Handler {
+            vector,
+            function: code.name_of(handler.entry),
+            longest: longest[&vector].clone(),
+            response_cycles: response_of(vector),
+            stack_bytes: code.elf.chip.return_address_bytes() + bytes(&handler.deepest),
         })
-        .collect();
-    for (handler, cycles) in timed.iter_mut().zip(responses) {
-        handler.response_cycles = cycles;
-    }
-    timed
+        .collect()
 }
 
-/// The longest wait of an input's edge for a read, and the highest rate of its edges. `of_handlers` are all handlers
-/// with their times.
+/// The longest wait of an input's edge for a read, and the highest rate of its edges.
 fn watch(
     input: &Input,
     code: &Code,
@@ -261,47 +253,40 @@ fn watch(
     Ok(EdgeBounds { wait_cycles, never_lost_per_s: input.edges_between_looks * input.clock_hz / wait_cycles })
 }
 
-/// The deepest stack: the main program plus a handler with interrupts on, or the main program alone with interrupts
-/// off.
+/// The deepest stack: the main program with interrupts on plus a handler, or with interrupts off alone.
 fn deepest<'a>(
     main: &Routine,
     handlers: impl Iterator<Item = &'a Rc<Routine>>,
     return_address_bytes: usize,
 ) -> Vec<Frame> {
     let handler = handlers.map(|handler| &handler.deepest).max_by_key(|frames| bytes(frames));
-    let interrupted = main.deepest_interrupted.clone().zip(handler).map(|(mut frames, handler)| {
-        frames.extend_from_slice(handler);
-        let handler = frames.len() - handler.len();
-        if let Some(first) = frames.get_mut(handler) {
+    let interrupted = main.deepest_interrupted.clone().zip(handler).map(|(frames, handler)| {
+        let mut handler = handler.clone();
+        if let Some(first) = handler.first_mut() {
             first.bytes += return_address_bytes;
         }
-        frames
+        [frames, handler].concat()
     });
     interrupted.into_iter().chain([main.deepest.clone()]).max_by_key(|frames| bytes(frames)).unwrap_or_default()
 }
 
 /// Every function that the program reaches, with interrupts on or off.
 fn functions(code: &Code, timer: &mut Timer) -> Vec<FunctionBounds> {
-    let mut found: BTreeMap<u32, (FunctionBounds, Option<Time>)> = BTreeMap::new();
-    for routine in code.routines() {
-        let calls = routine.nodes.iter().flat_map(Node::called).map(|called| code.name_of(called.entry));
-        let time = timer.longest(routine);
-        let (bounds, longest) = found.entry(routine.entry.address).or_insert_with(|| {
-            let bounds = FunctionBounds {
-                function: code.name_of(routine.entry),
-                address: routine.entry.address,
-                stack_bytes: 0,
-                longest: None,
-                calls: BTreeSet::new(),
-            };
-            (bounds, None)
-        });
-        bounds.stack_bytes = bounds.stack_bytes.max(bytes(&routine.deepest));
-        bounds.calls.extend(calls);
-        *longest = longer(longest.take(), time);
-    }
-    let functions = found.into_values();
-    functions.map(|(bounds, time)| FunctionBounds { longest: time.map(|time| time.longest(code)), ..bounds }).collect()
+    // They are in the order of their addresses.
+    let routines: Vec<_> = code.routines().collect();
+    let functions = routines.chunk_by(|one, next| one.entry.address == next.entry.address);
+    let bounds = |same: &[&Rc<Routine>]| {
+        let time = same.iter().map(|routine| timer.longest(routine)).fold(None, longer);
+        let called = same.iter().flat_map(|routine| &routine.nodes).flat_map(Node::called);
+        FunctionBounds {
+            function: code.name_of(same[0].entry),
+            address: same[0].entry.address,
+            stack_bytes: same.iter().map(|routine| bytes(&routine.deepest)).max().unwrap_or_default(),
+            longest: time.map(|time| time.longest(code)),
+            calls: called.map(|called| code.name_of(called.entry)).collect(),
+        }
+    };
+    functions.map(bounds).collect()
 }
 
 /// Every indirect call and jump.
@@ -319,7 +304,7 @@ impl Time {
     /// The time with its unbounded places.
     fn longest(&self, code: &Code) -> Longest {
         let without_bound = self.unbounded.iter().map(|&address| code.place(address)).collect();
-        Longest { cycles: self.is_bound().then_some(self.cycles), without_bound }
+        Longest { cycles: self.unbounded.is_empty().then_some(self.cycles), without_bound }
     }
 }
 

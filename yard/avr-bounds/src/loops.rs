@@ -38,8 +38,7 @@ pub struct LoopBound {
     /// on. The last number is valid for all deeper loops.
     #[serde(deserialize_with = "one_or_several")]
     pub passes: Vec<u64>,
-    /// Whether the loop turns once for each byte of the caller's length, and once more. A constant length then replaces
-    /// `passes`.
+    /// Whether it turns once for each byte of the caller's length, and once more: a constant length replaces `passes`.
     #[serde(default)]
     pub by_length: bool,
     /// The reason for the bound.

@@ -10,6 +10,7 @@
 //! libraries are not moved.
 
 use crate::decode::Instruction;
+use crate::decode::Operation::*;
 use crate::elf::Program;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -59,7 +60,7 @@ impl Graph {
             while address < first + function.bytes
                 && let Some(found) = Instruction::at(&elf.flash, address)
             {
-                if matches!(found.mnemonic().as_str(), "call" | "jmp" | "rcall" | "rjmp")
+                if matches!(found.operation, Call | Jmp | Rcall | Rjmp)
                     && let Some(target) = found.target(elf.flash.len() as u32)
                     && !(first..first + function.bytes).contains(&target)
                 {
@@ -96,8 +97,7 @@ impl Dice {
     }
 }
 
-/// The lines of a linker script for an order of functions with few long calls, and the number of long calls before and
-/// after.
+/// A linker script's lines for an order with few long calls, and the number of long calls before and after.
 ///
 /// The crates' numbers are left out of the names, since they differ between compilers.
 pub fn order(elf: &Program) -> (String, usize, usize) {

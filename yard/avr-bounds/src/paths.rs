@@ -29,8 +29,7 @@ pub(crate) fn entering<'a>(nodes: &'a [Node], set: &'a BTreeSet<usize>) -> impl 
 /// The edges of a graph: the successors of a node.
 pub(crate) type Edges<'a> = &'a dyn Fn(usize) -> Vec<usize>;
 
-/// The strongly connected parts of a set, each before the parts that it leads to (Kosaraju's algorithm, without
-/// recursion).
+/// The strongly connected parts of a set, each before the parts that it leads to (Kosaraju's algorithm).
 pub(crate) fn circles(set: &BTreeSet<usize>, edges: Edges) -> Vec<BTreeSet<usize>> {
     let edges = |node: usize| edges(node).into_iter().filter(|to| set.contains(to)).collect::<Vec<_>>();
     let mut from: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
@@ -68,8 +67,7 @@ pub(crate) fn loops(set: &BTreeSet<usize>, edges: Edges) -> Vec<BTreeSet<usize>>
     circles(set, edges).into_iter().filter(is_loop).collect()
 }
 
-/// Whether a place of a loop runs exactly once a turn: it is in no inner loop, and every turn from `head` to `head`
-/// passes it.
+/// Whether a place of a loop runs exactly once a turn: no inner loop has it, and every turn from `head` passes it.
 pub(crate) fn runs_once<'a>(circle: &'a BTreeSet<usize>, head: usize, edges: Edges<'a>) -> impl Fn(usize) -> bool + 'a {
     let loops_without = move |left_out: usize| {
         let others = circle.iter().copied().filter(|&node| node != left_out).collect();

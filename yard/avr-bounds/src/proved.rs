@@ -58,8 +58,7 @@ pub struct Handler {
     pub vector: u8,
     /// Its name.
     pub function: String,
-    /// The longest time from the interrupt's response to the end of its return; without cycles and unbounded parts if it
-    /// never returns.
+    /// The longest time from the interrupt's response to the end of its return; the default if it never returns.
     #[serde(flatten)]
     pub longest: Longest,
     /// The longest time from the request to the first instruction of the handler, if every handler of higher rank runs
@@ -75,8 +74,7 @@ pub struct Handler {
 pub struct Input {
     /// The vectors that its edges ask for.
     pub vectors: BTreeSet<u8>,
-    /// The register that their handlers read, by its address in the data space: on an ATmega328P PINB 0x23, PINC 0x26,
-    /// PIND 0x29.
+    /// The data address of the register that their handlers read. ATmega328P: PINB 0x23, PINC 0x26, PIND 0x29.
     pub port: u16,
     /// Edges between two reads that the handlers can still distinguish.
     pub edges_between_looks: u64,
@@ -160,8 +158,7 @@ pub struct Bounds {
     pub closed: Longest,
     /// The watched input.
     pub edges: Option<EdgeBounds>,
-    /// The longest turn of the main program's loop, from one `wdr` to the next, without handlers and sleep; `None` if no loop
-    /// feeds the watchdog.
+    /// The longest turn of the main loop, from `wdr` to `wdr`, without handlers and sleep; `None` if no loop has one.
     pub turn: Option<Longest>,
     /// Every loop without a bound, except those that the program never leaves.
     pub loops_without_bound: Vec<Place>,

@@ -16,6 +16,7 @@ const SEARCHED_WORDS: u32 = 12;
 const Z: usize = 30;
 
 /// What the direct jumps and calls reach.
+#[derive(Default)]
 pub(crate) struct Reach {
     /// Every word of an instruction.
     pub(crate) code: BTreeSet<u32>,
@@ -41,20 +42,15 @@ struct Paths {
 impl Reach {
     /// Follows a program whose vectors lie at this address, if it has some.
     pub(crate) fn of(elf: &Program, vectors: Option<u32>) -> Reach {
-        let table_jumps: BTreeSet<u32> = elf
-            .labels
-            .iter()
-            .filter(|(name, _)| name.starts_with("__tablejump"))
-            .map(|(_, address)| *address)
-            .collect();
         let handlers = vectors.into_iter().flat_map(|first| {
             (0..u32::from(elf.chip.vectors)).map(move |vector| first + vector * elf.chip.vector_bytes)
         });
         let mut roots: BTreeSet<u32> = elf.functions.keys().copied().chain([elf.start]).chain(handlers).collect();
         let mut returning = BTreeSet::new();
         loop {
-            let follow =
-                |&root: &u32| (root, paths(elf, root, &table_jumps, |_| false, |called| returning.contains(&called)));
+            let follow = |&root: &u32| {
+                (root, paths(elf, root, &elf.table_jumps, |_| false, |called| returning.contains(&called)))
+            };
             let all: BTreeMap<u32, Paths> = roots.iter().map(follow).collect();
             let before = (roots.len(), returning.len());
             roots.extend(all.values().flat_map(|paths| &paths.called));
@@ -62,13 +58,7 @@ impl Reach {
             if before != (roots.len(), returning.len()) {
                 continue;
             }
-            let mut reach = Reach {
-                code: BTreeSet::new(),
-                called: BTreeSet::new(),
-                tables: BTreeSet::new(),
-                start_up: BTreeSet::new(),
-                functions: BTreeMap::new(),
-            };
+            let mut reach = Reach::default();
             for (root, found) in all {
                 let words = found.places.iter().filter_map(|&place| Instruction::at(&elf.flash, place));
                 reach.code.extend(words.flat_map(|instruction| (instruction.address..instruction.next()).step_by(2)));

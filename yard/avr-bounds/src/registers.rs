@@ -15,20 +15,19 @@ use std::rc::Rc;
 /// The register that is zero except between instructions that change it (AVR calling convention).
 const ZERO: usize = 1;
 
-/// Proves that every function of this program keeps the calling convention, and that handlers restore all registers and
-/// flags.
+/// Proves that functions keep the calling convention, and that handlers restore all registers and flags.
 pub(crate) fn prove(program: &Code, handlers: &BTreeMap<u8, Rc<Routine>>) -> Result<(), BoundsError> {
     let is_named = |routine: &Routine| program.elf.functions.contains_key(&routine.entry.address);
     let functions = program.routines().filter(|routine| routine.entry.kind == Kind::Function && is_named(routine));
     for routine in functions.filter(|routine| !routine.returns.is_empty()) {
         let broken = |routine: &Routine| {
-            let zero = if routine.leaves_zero { Registers::NONE } else { Registers::one(ZERO) };
+            let zero = if routine.leaves_zero { Registers::empty() } else { Registers::one(ZERO) };
             (Registers::PRESERVED - routine.keeps) | zero
         };
         // An error names the function itself, not its caller.
         let called = routine.nodes.iter().flat_map(Node::called);
         let called = called.filter(|called| !called.returns.is_empty() && is_named(called));
-        let broken = broken(routine) - called.fold(Registers::NONE, |all, called| all | broken(called));
+        let broken = broken(routine) - called.map(|called| broken(called)).collect();
         if !broken.is_empty() {
             let function = program.name_of(routine.entry);
             return Err(BoundsError(format!(

@@ -41,8 +41,6 @@ pub(crate) struct Where {
 
 /// The data of a program that give the targets of indirect calls.
 pub(crate) struct Targets {
-    /// Entries of libgcc's routines that jump through a table.
-    table_jumps: BTreeSet<u32>,
     /// Addresses of code that are taken outside virtual tables, and whether this set is certain.
     taken: BTreeSet<u32>,
     is_exact: bool,
@@ -65,8 +63,6 @@ impl Targets {
     /// The targets of a program whose code begins at `code_start`, behind its vectors.
     pub(crate) fn new(elf: &Program, budgets: &Budgets, reach: &Reach, code_start: u32) -> Targets {
         let search = Search { elf, reach, code_start };
-        let table_jumps = elf.labels.iter().filter(|(name, _)| name.starts_with("__tablejump"));
-        let table_jumps = table_jumps.map(|(_, address)| *address).collect();
         let virtual_tables = elf.virtual_tables.iter().map(|table| {
             let words: Vec<u16> =
                 elf.data[table.clone()].chunks_exact(2).map(|word| u16::from_le_bytes([word[0], word[1]])).collect();
@@ -78,12 +74,7 @@ impl Targets {
             (caller.clone(), called.iter().flat_map(|name| elf.functions_called(name)).collect())
         });
         let (taken, is_exact) = search.taken();
-        Targets { table_jumps, is_exact, taken, virtual_tables: virtual_tables.collect(), listed: listed.collect() }
-    }
-
-    /// Whether a routine at this address jumps through a table.
-    pub(crate) fn is_table_jump(&self, address: u32) -> bool {
-        self.table_jumps.contains(&address)
+        Targets { is_exact, taken, virtual_tables: virtual_tables.collect(), listed: listed.collect() }
     }
 
     /// The targets of a call or jump at `at` to such a routine, and the cycles of the routine itself.

@@ -50,8 +50,7 @@ pub(crate) enum Value {
     StackHigh(i32),
     /// The status register, with interrupts on or off, and whether all other flags are as at the entry.
     Status(bool, bool),
-    /// From memory, at this displacement from a pointer, and whether the pointer itself came from memory. `None` is a
-    /// fixed address.
+    /// From memory, at this displacement from a pointer (`None`: a fixed address), and whether the pointer did so too.
     Loaded(Option<u8>, bool),
     /// An unknown value, less a constant.
     Less(u8),
@@ -93,6 +92,7 @@ pub(crate) struct Known {
     counted: Option<usize>,
     /// Whether every path here has started the program again.
     pub(crate) restarts: bool,
+    pub(crate) interrupts: Interrupts,
 }
 
 /// The registers with known constants.
@@ -100,7 +100,7 @@ pub(crate) type Constants = [Option<u8>; 32];
 
 impl Known {
     /// The known facts at a routine's entry.
-    pub(crate) fn at_entry(is_function: bool) -> Known {
+    pub(crate) fn at_entry(is_function: bool, interrupts: Interrupts) -> Known {
         Known {
             registers: std::array::from_fn(Value::AtEntry),
             flags: (0, 0),
@@ -112,7 +112,17 @@ impl Known {
             upper_half: None,
             counted: None,
             restarts: false,
+            interrupts,
         }
+    }
+
+    /// Sets the interrupt flag, or clears it.
+    pub(crate) fn turn_interrupts(&mut self, on: bool) {
+        self.interrupts = match (on, self.interrupts) {
+            (false, _) => Interrupts::Off,
+            (true, Interrupts::Off) => Interrupts::Soon,
+            (true, already) => already,
+        };
     }
 
     /// Takes the branch on which the last result was zero.
@@ -156,7 +166,7 @@ impl Known {
         let (mask, bits) = self.flags;
         let mask = mask & other.flags.0 & !(bits ^ other.flags.1);
         self.flags = (mask, bits & mask);
-        self.unchanged = self.unchanged & other.unchanged;
+        self.unchanged &= other.unchanged;
         if self.borrow != other.borrow {
             self.borrow = None;
         }
@@ -172,11 +182,11 @@ impl Known {
 
     /// The effect of a routine: registers and flags that it does not preserve are unknown.
     pub(crate) fn after(&mut self, keeps: Registers) {
-        for register in (Registers::ALL - Registers::FLAGS - keeps).iter() {
+        for register in (Registers::ALL - Registers::FLAGS - keeps).numbers() {
             self.registers[register] = Value::Unknown;
         }
         self.flags = (0, 0);
-        self.unchanged = self.unchanged & keeps;
+        self.unchanged &= keeps;
         self.borrow = None;
         self.counted = None;
     }
@@ -245,7 +255,7 @@ impl Known {
             Some(flag) => self.flags.0 >> flag & 1 == 1,
             None => self.constant(place).is_some(),
         };
-        if !effects.reads.iter().all(known) {
+        if !effects.reads.numbers().all(known) {
             return false;
         }
         let registers = std::array::from_fn(|register| self.constant(register).unwrap_or_default());
@@ -253,7 +263,7 @@ impl Known {
         if !concrete.carry_out(instruction) {
             return false;
         }
-        for place in effects.changes.iter() {
+        for place in effects.changes.numbers() {
             match place.checked_sub(FLAGS) {
                 None => self.registers[place] = Value::Constant(concrete.registers[place]),
                 Some(flag) => {
@@ -272,8 +282,7 @@ impl Known {
         Some(if by < 0 { address.wrapping_add_signed(by.into()) } else { address })
     }
 
-    /// The stack's depth below the last address of SRAM if this instruction sets the stack pointer to a constant, on a
-    /// path that has started the program again.
+    /// The stack's depth if this instruction sets the stack pointer to a constant, in a program that has started again.
     pub(crate) fn starts_again(&self, instruction: &Instruction, chip: &Chip) -> Option<usize> {
         let writes = match instruction.operation {
             Out | Sts => instruction.data_address(),
@@ -287,32 +296,24 @@ impl Known {
         chip.ram_last.checked_sub(address).map(usize::from)
     }
 
-    /// Writes a register's value to an address in the data space. Only start-up code may set the stack pointer to a
-    /// constant.
-    fn write(
-        &mut self,
-        address: u16,
-        register: usize,
-        chip: &Chip,
-        interrupts: &mut Interrupts,
-        is_start_up: bool,
-    ) -> Result<(), Problem> {
+    /// Writes a register to the data space. Only start-up code may set the stack pointer to a constant.
+    fn write(&mut self, address: u16, register: usize, chip: &Chip, is_start_up: bool) -> Result<(), Problem> {
         use Value::{Constant, StackHigh, StackLow, Status, Unknown};
 
         let value = self.constant(register).map_or(self.registers[register], Constant);
         match address {
             SREG => {
                 self.flags = (0, 0);
-                self.unchanged = Registers::NONE;
+                self.unchanged = Registers::empty();
                 self.counted = None;
                 match value {
                     Status(on, is_of_entry) => {
-                        turn(interrupts, on);
+                        self.turn_interrupts(on);
                         if is_of_entry {
                             self.unchanged = Registers::FLAGS;
                         }
                     }
-                    Constant(status) => turn(interrupts, status >> INTERRUPT_FLAG & 1 == 1),
+                    Constant(status) => self.turn_interrupts(status >> INTERRUPT_FLAG & 1 == 1),
                     _ => return Err(Problem::UnknownStatus),
                 }
             }
@@ -344,14 +345,11 @@ impl Known {
         Ok(())
     }
 
-    /// Executes an instruction that continues at the next one. Only start-up code may set the stack pointer to a
-    /// constant.
+    /// Executes an instruction that continues at the next one. Start-up code may set the stack pointer.
     pub(crate) fn carry_out(
         &mut self,
         instruction: &Instruction,
         chip: &Chip,
-        interrupts_before: Interrupts,
-        interrupts: &mut Interrupts,
         is_start_up: bool,
     ) -> Result<(), Problem> {
         use Value::{Constant, Less, Loaded, StackHigh, StackLow, Status, Unknown};
@@ -367,7 +365,7 @@ impl Known {
             Add | Adc | Sub | Subi | And | Andi | Or | Ori | Eor | Com | Neg | Inc | Dec | Lsr | Ror | Asr
         );
         self.counted = if is_of_one { Some(d) } else { self.counted.filter(tells) };
-        self.unchanged = self.unchanged - changes;
+        self.unchanged -= changes;
         let moves = self.moves_stack_pointer(instruction);
         if !moves && !(changes & Registers::CARRY_FLAG).is_empty() {
             self.borrow = None;
@@ -376,14 +374,14 @@ impl Known {
             // Registers that are only moved may hold more than constants.
             return Ok(());
         }
-        let changed_flags = (0..8).filter(|&flag| changes.contains(FLAGS + flag)).fold(0, |all, flag| all | 1 << flag);
+        let changed_flags = (0..8).filter(|&flag| changes.has(FLAGS + flag)).fold(0, |all, flag| all | 1 << flag);
         self.flags = (self.flags.0 & !changed_flags, self.flags.1 & !changed_flags);
         if moves {
             return Ok(());
         }
         match instruction.operation {
-            Bset if instruction.operand('s') == INTERRUPT_FLAG => turn(interrupts, true),
-            Bclr if instruction.operand('s') == INTERRUPT_FLAG => turn(interrupts, false),
+            Bset if instruction.operand('s') == INTERRUPT_FLAG => self.turn_interrupts(true),
+            Bclr if instruction.operand('s') == INTERRUPT_FLAG => self.turn_interrupts(false),
             Push => self.stack.push(self.registers[r]),
             Pop => self.registers[d] = self.stack.pop().ok_or(Problem::TakesTooMuch)?,
             Mov => self.registers[d] = self.registers[r],
@@ -397,7 +395,7 @@ impl Known {
                 self.registers[d] = match instruction.data_address() {
                     Some(SPL) => StackLow(depth as u8),
                     Some(SPH) => StackHigh(depth),
-                    Some(SREG) => Status(interrupts_before != Interrupts::Off, self.unchanged == Registers::FLAGS),
+                    Some(SREG) => Status(self.interrupts != Interrupts::Off, self.unchanged == Registers::FLAGS),
                     _ if instruction.operation == Lds && gpior.is_none() => Loaded(None, false),
                     _ => gpior.map_or(Unknown, |gpior| self.kept[gpior]),
                 };
@@ -407,7 +405,7 @@ impl Known {
                 if address < 0x20 {
                     return Err(Problem::RegisterInMemory);
                 }
-                self.write(address, r, chip, interrupts, is_start_up)?;
+                self.write(address, r, chip, is_start_up)?;
             }
             Sbi | Cbi => gpior.into_iter().for_each(|gpior| self.kept[gpior] = Unknown),
             Mul | Muls | Mulsu | Fmul | Fmuls | Fmulsu => self.registers[..2].fill(Unknown),
@@ -417,7 +415,7 @@ impl Known {
                 if matches!(instruction.operation, St | Std)
                     && let Some(address) = self.pointed_at(instruction)
                 {
-                    self.write(address, r, chip, interrupts, is_start_up)?;
+                    self.write(address, r, chip, is_start_up)?;
                 }
                 match instruction.operation {
                     Lpm | Elpm => self.registers[d] = Unknown,
@@ -458,21 +456,11 @@ impl Known {
     }
 }
 
-/// The value of a byte in a frame that stays valid. Variables can be changed through pointers, so only values that
-/// compilers save count.
+/// The value of a byte in a frame, if compilers save such values. Others can be changed through pointers.
 fn lasting(value: Value) -> Value {
     match value {
-        Value::AtEntry(register) if Registers::PRESERVED.contains(register) => value,
+        Value::AtEntry(register) if Registers::PRESERVED.has(register) => value,
         Value::Status(..) | Value::StackLow(_) | Value::StackHigh(_) => value,
         _ => Value::Unknown,
     }
-}
-
-/// Sets the interrupt flag, or clears it.
-pub(crate) fn turn(interrupts: &mut Interrupts, on: bool) {
-    *interrupts = match (on, *interrupts) {
-        (false, _) => Interrupts::Off,
-        (true, Interrupts::Off) => Interrupts::Soon,
-        (true, already) => already,
-    };
 }

@@ -1,5 +1,4 @@
-//! Alarms and commands: the check plays a fault. The tester measures when the tool goes out and which code the LED
-//! flashes.
+//! Alarms and commands: the check plays a fault, and measures when the tool goes out and which code the LED flashes.
 //!
 //! Each scene begins at work with the tool in, on ground that the weeder takes as seen. Times count from the fault's
 //! edge to the first pulse for out.
@@ -118,8 +117,7 @@ pub struct Raised {
 /// The machine for [`Boards::beam_to_window_ms`]: beam and tool 100 mm apart, a margin of 50 mm, and no lead.
 const NEAR_MACHINE: [&str; 4] = ["top_speed_mm_s 200", "lead_out_ms 0", "margin_mm 50", "beam_to_tool_mm 100"];
 
-/// From the beam's edge to the keep-out zone: 50 mm in counts of the factory settings' wheel, 400 mm and 2400 counts
-/// around.
+/// From the beam's edge to the keep-out zone, 50 mm: the factory settings' wheel has 400 mm and 2400 counts.
 const WINDOW_COUNTS: f64 = 50.0 * 2400.0 / (std::f64::consts::PI * 400.0);
 
 /// Counts a second there: 0.1 m/s.
@@ -129,7 +127,7 @@ impl Boards {
     /// Plays a scene. The weeder is in hold afterwards.
     pub fn play_scene(&mut self, scene: &Scene) -> Result<Raised, CheckError> {
         self.set_to_work(scene.alarm == Alarm::ToolStuck)?;
-        let mut plan = Plan::new();
+        let mut plan = Plan::default();
         plan.at(ms(STILL_MS).into(), Action::Pause);
         plan.roll(scene.rolled, COUNTS_PER_S);
         let fault = plan.end() + u64::from(ms(scene.wait_ms));
@@ -141,7 +139,7 @@ impl Boards {
         // The record may begin at any phase: so it must hold a code with the pauses before and after it.
         let code_ms = f64::from(2 * (2 * u16::from(first + second) + 8) + 10) * QUARTER_MS;
         let records = self.tester.record_for_ms(code_ms as u32)?;
-        let mut free = Plan::new();
+        let mut free = Plan::default();
         free.at(ms(1).into(), Action::Freeze { mask: 0 });
         self.play(free)?;
         self.tester.set(AT_REST, AT_REST)?;
@@ -156,8 +154,7 @@ impl Boards {
 
     /// Puts the weeder to work with the tool in, and with the end switch if `has_end_switch` is set.
     fn set_to_work(&mut self, has_end_switch: bool) -> Result<(), CheckError> {
-        // The weeder's memory of an earlier scene or burst, such as a wheel that stopped suddenly, counts toward some
-        // alarms. A reset clears it.
+        // An earlier scene or burst, such as a wheel that stopped suddenly, counts toward some alarms until a reset.
         self.reset()?;
         self.weeder.to_hold()?;
         let end_switch = Line::EndSwitch.bit();
@@ -190,7 +187,7 @@ impl Boards {
         self.tester.set(Line::WorkSwitch.bit(), 0)?;
         // `start now` at work would skip the unseen ground, so `set_to_work` first goes to hold.
         self.set_to_work(false)?;
-        let mut plan = Plan::new();
+        let mut plan = Plan::default();
         plan.at(u64::from(ms(2 * STILL_MS)), Action::level(Line::WorkSwitch, true));
         let opened = plan.end();
         plan.at(opened + u64::from(ms(AFTER_MS)), Action::Pause);
@@ -207,7 +204,7 @@ impl Boards {
         }
         self.weeder.ask("start now")?;
         self.tester.record_for_ms(2 * STILL_MS)?;
-        let mut plan = Plan::new();
+        let mut plan = Plan::default();
         plan.roll(100, SLOW_COUNTS_PER_S);
         plan.at(plan.end(), Action::level(Line::Beam, false));
         let edge = plan.end();
@@ -219,8 +216,7 @@ impl Boards {
         Ok(out_ms - WINDOW_COUNTS * 1000.0 / SLOW_COUNTS_PER_S * self.clock_ratio)
     }
 
-    /// From typing `hold` to the first pulse for out, in ms. This includes the delays of the computer and of the serial
-    /// lines.
+    /// From typing `hold` to the first pulse for out, in ms, with the delays of computer and serial lines.
     pub fn hold_to_out_ms(&mut self) -> Result<f64, CheckError> {
         self.set_to_work(false)?;
         let mut records = self.tester.record_for_ms(STILL_MS)?;

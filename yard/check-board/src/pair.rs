@@ -27,8 +27,7 @@ const STEPS_TO_RESET: u64 = 64;
 /// The difference of the clocks in parts per million: the weeder's is faster by 0.3 %.
 pub const CLOCK_PPM: i64 = 3000;
 
-/// The tester's pins; the firmware's own are in `yard/tester/src/lines.rs`. Those of its lines are in the order of
-/// [`Line::ALL`].
+/// The tester's pins, as in `yard/tester/src/lines.rs`. Those of its lines are in the order of [`Line::ALL`].
 const TESTER_LINES: [Pin; 6] = [Pin::A0, Pin::A1, Pin::A2, Pin::A3, Pin::A4, Pin::A5];
 const TESTER_RESET: Pin = Pin::D7;
 const TESTER_LED: Pin = Pin::D6;
@@ -95,8 +94,7 @@ pub struct Pair {
 }
 
 impl Pair {
-    /// Powers both up, with an erased EEPROM of the weeder. `second` is the program of another simulator that runs the
-    /// weeder.
+    /// Powers both up, with an erased EEPROM. `second` is the program of another simulator that runs the weeder.
     ///
     /// # Errors
     /// If an ELF cannot be run, or the other simulator.
@@ -206,8 +204,7 @@ impl Pair {
         Ok(())
     }
 
-    /// The duration of the check so far with real boards, in seconds. At each reset of a real board its bootloader
-    /// waits for `bootloader_s`.
+    /// The duration so far with real boards, in seconds. At each reset the bootloader waits for `bootloader_s`.
     pub fn duration_s(&self, bootloader_s: f64) -> f64 {
         self.tester.cycle() as f64 / CYCLES_PER_SECOND as f64 + f64::from(self.resets) * bootloader_s
     }

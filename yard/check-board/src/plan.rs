@@ -1,8 +1,7 @@
 //! Plans: converts levels at cycles to the pieces that the tester plays.
 //!
 //! A wheel makes thousands of counts a second, and the serial line carries 11 bytes a millisecond. So evenly spaced
-//! counts become one piece. Each count is at most `TOLERANCE` away from its time. Its error does not shift later
-//! events.
+//! counts become one piece, each at most `TOLERANCE` away from its time. Later events are not shifted.
 
 use field::wiring;
 use tester_core::pins::Line;
@@ -30,7 +29,7 @@ pub fn line(pin: Pin) -> Option<Line> {
     INPUTS.iter().find(|input| input.1 == pin).map(|input| input.0)
 }
 
-/// A plan that is being made: its pieces, and the cycle of its last event.
+/// A plan that is being made: its pieces, and the cycle of its last event. It is empty at first and begins at cycle 0.
 #[derive(Clone, Debug, Default)]
 pub struct Plan {
     pieces: Vec<Piece>,
@@ -38,11 +37,6 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// An empty plan, which begins at cycle 0.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Adds an event at a cycle, or as soon after the previous one as possible.
     pub fn at(&mut self, cycle: u64, action: Action) {
         self.repeat(1, cycle.saturating_sub(self.last).max(SHORTEST) as u32, action);

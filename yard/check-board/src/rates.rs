@@ -1,5 +1,4 @@
-//! Rates: bursts of the encoder up to and beyond the proved rate, and whether the weeder loses a count; and glitches of
-//! a channel.
+//! Rates: whether the weeder loses a count in bursts of the encoder beyond the proved rate, or by glitches.
 //!
 //! The tester counts cycles between two edges, so a rate is exact by its clock. The weeder is in hold. Busy means that
 //! it prints all its settings meanwhile, and that the beam changes once in 128 counts.
@@ -10,8 +9,7 @@ use tester_core::message::{Command, PATTERN_STEPS, REPEAT_CYCLES, STEP_CYCLES, S
 use tester_core::pins::Line;
 use uno::CYCLES_PER_SECOND;
 
-/// Counts of a burst after its run-up: 0.1 s at the highest rate. This is shorter than the weeder's timeout for its
-/// main loop.
+/// Counts of a burst after its run-up: 0.1 s at the highest rate, less than the timeout of the weeder's main loop.
 const COUNTS: u32 = 29_000;
 
 /// Counts of the run-up, and the length of its steps, in units of [`STEP_CYCLES`]: 40,000 counts a second. Without it
@@ -25,8 +23,7 @@ pub const PROVED_CYCLES: u32 = 55;
 /// Greatest shortening in [`Boards::highest_rate`], in cycles. Every handler takes longer than the rest.
 const SHORTER_CYCLES: u32 = 42;
 
-/// Jitter: how early or late an edge comes, as a share of the time between two. It stands for a worn or eccentric
-/// disc.
+/// How early or late an edge comes, as a share of the time between two, as with a worn or eccentric disc.
 const JITTER: f64 = 0.3;
 
 /// Time in which the weeder answers the last question, in ms.
@@ -134,8 +131,7 @@ impl Boards {
         Ok(highest)
     }
 
-    /// Counts that remain after glitches of a channel: the level changes and changes back, for each length. Returns the
-    /// sum over all lengths.
+    /// Counts that remain after glitches of a channel (its level changes and changes back), summed over their lengths.
     pub fn left_by_glitches(&mut self, channel: Line) -> Result<f64, CheckError> {
         let Self { weeder, tester, .. } = self;
         weeder.to_hold()?;

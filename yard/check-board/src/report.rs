@@ -16,26 +16,17 @@ pub const FORM: u32 = 1;
 const SIMULATED: &str = include_str!("simulated.json");
 
 /// The verdict on a line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, strum::Display)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum Verdict {
     /// Within its limits, and as simulated.
     Pass,
     /// Within its limits, and not as simulated.
     Differs,
     /// Outside its limits.
+    #[strum(to_string = "FAIL")]
     Fail,
-}
-
-impl Verdict {
-    /// Its word in the report.
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::Pass => "pass",
-            Self::Differs => "differs",
-            Self::Fail => "FAIL",
-        }
-    }
 }
 
 /// A figure.
@@ -64,8 +55,7 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// A figure without limits and with this tolerance, not yet judged. If `measured` is not finite, the event never
-    /// came.
+    /// A figure without limits, not yet judged. If `measured` is not finite, the event never came.
     pub fn new(id: impl Into<String>, what: impl Into<String>, unit: &str, measured: f64, tolerance: f64) -> Self {
         Self {
             id: id.into(),
@@ -204,14 +194,14 @@ impl Report {
             let _ = writeln!(
                 page,
                 "<tr class={:?}><td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}</tr>",
-                line.verdict.word().to_lowercase(),
+                line.verdict.to_string().to_lowercase(),
                 escaped(&line.what),
                 number(line.simulated),
                 number(line.proved),
                 measured(line),
                 limits(line),
                 escaped(&line.unit),
-                line.verdict.word()
+                line.verdict
             );
         }
         page.push_str("</table>\n");
@@ -228,7 +218,7 @@ impl Report {
             let _ = writeln!(
                 text,
                 "{:8} {:<58} {:>10} {:<7} simulated {:>9}  proved {:>7}  right {}",
-                line.verdict.word(),
+                line.verdict,
                 line.what,
                 measured(line),
                 line.unit,

@@ -55,8 +55,7 @@ pub enum ResetBy {
 /// The result of a reset.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Restart {
-    /// From the last pulse's end to the beginning of the first one after the reset, in ms by the weeder's clock;
-    /// infinite without one.
+    /// From the last pulse's end to the first one after the reset, in ms by the weeder's clock; infinite without one.
     pub without_pulse_ms: f64,
     /// Whether all pulses after it are for out, and the weeder is not at work.
     pub is_out: bool,
@@ -105,7 +104,7 @@ impl Boards {
         self.weeder.to_hold()?;
         if reset_by != ResetBy::Watchdog {
             self.weeder.ask("start now")?;
-            let mut plan = Plan::new();
+            let mut plan = Plan::default();
             plan.roll(ROLL_COUNTS, ROLL_COUNTS_PER_S);
             self.tester.begin(&plan.finish())?;
         }
@@ -141,8 +140,7 @@ impl Boards {
         })
     }
 
-    /// Runs a pass while the weeder has at least one taught example, so that one can be lost. If it has none, one is
-    /// taught and then forgotten.
+    /// Tries something while the weeder has a taught example to lose. If it has none, one is taught and then forgotten.
     ///
     /// # Errors
     /// The errors of the pass, or if the weeder refuses the example or does not forget it.

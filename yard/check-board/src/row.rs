@@ -46,8 +46,7 @@ pub fn pass(plants: usize, weeds: usize, speed_km_h: f64) -> Result<Pass, CheckE
     Ok(pass)
 }
 
-/// A width this near to one of the servo's two settings counts as that setting, in us. The simulated servo would
-/// otherwise follow smaller differences.
+/// A width this near to a setting of the servo counts as it, in us: the simulated servo follows any difference.
 const SAME_WIDTH_US: f64 = 1.0;
 
 impl Boards {
@@ -60,7 +59,7 @@ impl Boards {
         }
         let before = self.weeder.status()?.position;
         self.weeder.ask("start")?;
-        let mut plan = Plan::new();
+        let mut plan = Plan::default();
         let begin = u64::from(ms(STILL_MS));
         plan.follow(&machine.pin_changes(row, motion, 0), begin);
         plan.at(begin + (motion.duration_s() * CYCLES_PER_SECOND as f64) as u64, Action::Pause);

@@ -36,8 +36,7 @@ impl Extent {
 /// saved settings again, also after an error.
 ///
 /// # Errors
-/// If a board does not answer, or the check is interrupted. Wrong wires are no error: the report has them, and then
-/// nothing else.
+/// If a board does not answer, or the check is interrupted. A report of wrong wires has nothing else.
 pub fn run(boards: &mut Boards, extent: Extent, progress: impl FnMut(&'static str, f64)) -> Result<Report, CheckError> {
     let report = check(boards, extent, progress);
     let reset = boards.reset();
@@ -170,8 +169,7 @@ fn alarms(boards: &mut Boards, extent: Extent) -> Result<Vec<Figure>, CheckError
     Ok(figures)
 }
 
-/// Longest time without a pulse, in ms. A bootloader takes 2 s at most, and a virtual Uno has none: so the tolerance is
-/// as great.
+/// Longest time without a pulse, in ms, and its tolerance: a bootloader takes up to 2 s, and a virtual Uno has none.
 const RESET_MS: f64 = 2500.0;
 
 /// The resets' figures.

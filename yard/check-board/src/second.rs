@@ -26,7 +26,7 @@ const DELAY: u64 = TURN + 64;
 type Edges = Vec<(u64, usize, bool)>;
 
 /// The inputs of a turn. `page/src/uno/lockstep.ts` reads them.
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 struct Turn {
     until: u64,
     edges: Edges,
@@ -46,11 +46,9 @@ pub struct SecondUno {
     process: Child,
     to: ChildStdin,
     from: BufReader<ChildStdout>,
-    /// The requested end of its run, and the reached one, in cycles.
-    asked: u64,
+    /// The next turn up to the requested end of its run, and the reached end, in cycles.
+    next: Turn,
     run: u64,
-    edges: Edges,
-    typed: Vec<u8>,
     changes: Vec<PinChange>,
     said: Vec<u8>,
 }
@@ -71,27 +69,26 @@ impl SecondUno {
             .context(SECOND)?;
         let to = process.stdin.take().context(SECOND)?;
         let from = BufReader::new(process.stdout.take().context(SECOND)?);
-        let mut uno =
-            Self { process, to, from, asked: 0, run: 0, edges: vec![], typed: vec![], changes: vec![], said: vec![] };
+        let mut uno = Self { process, to, from, next: Turn::default(), run: 0, changes: vec![], said: vec![] };
         uno.exchange(&json!({ "hex": hex::text(&flash) })).context(SECOND)?;
         Ok(uno)
     }
 
     /// The requested end of its run, in cycles.
     pub fn cycle(&self) -> u64 {
-        self.asked
+        self.next.until
     }
 
     /// Lets its clock run, one whole turn at a time.
     pub fn run_until(&mut self, cycle: u64) -> Result<()> {
-        self.asked = self.asked.max(cycle);
-        if self.asked < self.run + TURN { Ok(()) } else { self.turn(false) }
+        self.next.until = self.next.until.max(cycle);
+        if self.next.until < self.run + TURN { Ok(()) } else { self.turn() }
     }
 
     /// Changes input pins.
     pub fn drive(&mut self, changes: impl IntoIterator<Item = PinChange>) {
-        let number = |pin| Pin::ALL.iter().position(|&one| one == pin).unwrap_or_default();
-        self.edges.extend(changes.into_iter().map(|change| (change.cycle, number(change.pin), change.high)));
+        let edge = |change: PinChange| (change.cycle, change.pin.number().into(), change.high);
+        self.next.edges.extend(changes.into_iter().map(edge));
     }
 
     /// Its new output edges.
@@ -101,12 +98,12 @@ impl SecondUno {
 
     /// Types bytes into it.
     pub fn send(&mut self, bytes: &[u8]) {
-        self.typed.extend(bytes);
+        self.next.typed.extend(bytes);
     }
 
     /// Typed bytes that have not reached it.
     pub fn bytes_pending(&self) -> usize {
-        self.typed.len()
+        self.next.typed.len()
     }
 
     /// Its new serial output.
@@ -116,15 +113,15 @@ impl SecondUno {
 
     /// Pulls its reset.
     pub fn reset(&mut self) -> Result<()> {
-        self.turn(false)?;
-        self.turn(true)
+        self.turn()?;
+        self.next.reset = true;
+        self.turn()
     }
 
-    fn turn(&mut self, reset: bool) -> Result<()> {
-        let until = self.asked;
-        let (edges, typed) = (std::mem::take(&mut self.edges), std::mem::take(&mut self.typed));
-        let done = self.exchange(&Turn { until, edges, typed, reset }).context(SECOND)?;
-        self.run = until;
+    fn turn(&mut self) -> Result<()> {
+        self.run = self.next.until;
+        let turn = std::mem::replace(&mut self.next, Turn { until: self.run, ..Turn::default() });
+        let done = self.exchange(&turn).context(SECOND)?;
         let change = |(cycle, pin, high): (u64, usize, bool)| {
             Pin::ALL.get(pin).map(|&pin| PinChange { cycle: cycle + DELAY, pin, high })
         };

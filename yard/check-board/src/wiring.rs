@@ -3,8 +3,8 @@
 use crate::plan::Plan;
 use crate::servo;
 use crate::{Boards, CheckError};
+use derive_more::{Deref, DerefMut};
 use link::{Link, LinkError, Mode, Status};
-use std::ops::{Deref, DerefMut};
 use tester_core::message::{Command, Record};
 use tester_core::pins::{AT_REST, Line, WIRES, Wire};
 use tester_core::player::Action;
@@ -18,28 +18,16 @@ const STUCK_MS: u32 = 800;
 /// Width of the pulse with which the tester checks its own capture, in cycles.
 const OWN_PULSE: u16 = 16_000;
 
-/// Greatest positive error of the tester's measurement of its own pulse, in cycles: its loop reads the clock every few
-/// microseconds.
+/// Greatest excess of the tester's own pulse, in cycles: its loop reads the clock every few microseconds.
 const OWN_PULSE_ERROR: u32 = 800;
 
 /// The weeder's console. Its methods fail if the port is gone, or the weeder does not answer.
+#[derive(Deref, DerefMut)]
 pub struct Weeder {
+    #[deref]
+    #[deref_mut]
     link: Link,
     open: Box<dyn FnMut() -> Result<Link, LinkError>>,
-}
-
-impl Deref for Weeder {
-    type Target = Link;
-
-    fn deref(&self) -> &Link {
-        &self.link
-    }
-}
-
-impl DerefMut for Weeder {
-    fn deref_mut(&mut self) -> &mut Link {
-        &mut self.link
-    }
 }
 
 impl Weeder {
@@ -270,7 +258,7 @@ impl Boards {
         let Self { weeder, tester, .. } = self;
         weeder.to_hold()?;
         weeder.ask(&format!("set second_beam_mm {SECOND_BEAM_MM}"))?;
-        let mut plan = Plan::new();
+        let mut plan = Plan::default();
         let mut play = |counts, line: Line, high: bool| {
             plan.roll(counts, PLANT_COUNTS_PER_S);
             plan.at(plan.end(), Action::level(line, high));

@@ -1,12 +1,5 @@
 //! The board: an Uno with its firmware, the wires on its pins, and a terminal at its serial line.
 
-use std::collections::VecDeque;
-use std::ops::Range;
-use std::path::Path;
-
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
-
 use crate::bootloader::Bootloader;
 use crate::core::adc::SUPPLY_MILLIVOLTS;
 use crate::core::measuring::{Cycles, InterruptStatistics, Place};
@@ -16,6 +9,11 @@ use crate::elf::{Image, Size, Variable};
 use crate::error::UnoError;
 use crate::memory::EEPROM_BYTES;
 use crate::pins::{CYCLES_PER_SECOND, Pin, PinChange, Pulse, Wire};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::collections::VecDeque;
+use std::ops::Range;
+use std::path::Path;
 
 /// The terminal's bit rate, until it follows the chip.
 pub const BAUD: u64 = 115_200;
@@ -41,7 +39,6 @@ impl Uno {
     /// Powers up an Uno with the firmware at `elf` and an erased EEPROM. Nothing is wired to its inputs yet ([`Uno::wired`]).
     ///
     /// # Errors
-    ///
     /// If the ELF cannot be read or does not fit the chip.
     pub fn boot(elf: &Path) -> Result<Uno, UnoError> {
         Uno::boot_with_eeprom(elf, &[])
@@ -50,7 +47,6 @@ impl Uno {
     /// As [`Uno::boot`], with `eeprom` at the EEPROM's address 0; the rest is erased.
     ///
     /// # Errors
-    ///
     /// As [`Uno::boot`], and if `eeprom` is longer than 1024 bytes.
     pub fn boot_with_eeprom(elf: &Path, eeprom: &[u8]) -> Result<Uno, UnoError> {
         let image = Image::read(elf)?;
@@ -63,7 +59,6 @@ impl Uno {
     /// erased. Every reset starts the bootloader, as with the fuses of a real Uno.
     ///
     /// # Errors
-    ///
     /// As [`Uno::boot_with_eeprom`], and if the firmware overlaps the bootloader.
     pub fn boot_with_bootloader(bootloader: &Bootloader, elf: Option<&Path>, eeprom: &[u8]) -> Result<Uno, UnoError> {
         let mut image = elf.map(Image::read).transpose()?.unwrap_or_default();
@@ -86,8 +81,7 @@ impl Uno {
         })
     }
 
-    /// The Uno with these wires on its pins, each at its level at rest. Before the first instruction this is the same
-    /// as wires that were there at power-up.
+    /// The Uno with these wires on its pins, each at its level at rest: before the first instruction, as at power-up.
     #[must_use]
     pub fn wired(mut self, wires: &[Wire]) -> Uno {
         for wire in wires {
@@ -169,7 +163,6 @@ impl Uno {
     /// to 1.5 V; in between it keeps its level (data sheet, DC characteristics).
     ///
     /// # Panics
-    ///
     /// If the pin is none of A0 to A5.
     pub fn set_millivolts(&mut self, pin: Pin, millivolts: u16) {
         let channel = pin.adc_channel().unwrap_or_else(|| panic!("{pin} is not an analogue pin: take A0 to A5"));
@@ -215,7 +208,6 @@ impl Uno {
     /// Runs until the firmware has sent `text`. Takes all output up to the text's end.
     ///
     /// # Errors
-    ///
     /// As [`Uno::run_until`], and if the text has not come after `timeout_cycles`.
     pub fn run_until_serial(&mut self, text: &str, timeout_cycles: u64) -> Result<String, UnoError> {
         let deadline = self.cycle() + timeout_cycles;
@@ -243,7 +235,6 @@ impl Uno {
     /// At `main` the start-up code has filled SRAM, and no line of the firmware's own has run.
     ///
     /// # Errors
-    ///
     /// As [`Uno::run_until`], if the ELF has no such function, and if it is not reached within `timeout_cycles`.
     pub fn run_until_symbol(&mut self, symbol: &str, timeout_cycles: u64) -> Result<(), UnoError> {
         let address = self.image.functions.get(symbol).copied();
@@ -269,8 +260,7 @@ impl Uno {
         self.core.place()
     }
 
-    /// Gives the receiver a byte whose stop bit ends now, independent of the queue of [`Uno::send`]. Returns whether it
-    /// had room.
+    /// Gives the receiver a byte whose stop bit ends now, past the queue of [`Uno::send`]. Returns whether it had room.
     pub fn receive(&mut self, byte: u8) -> bool {
         self.core.receive(byte)
     }
@@ -303,8 +293,7 @@ impl Uno {
         if self.follows_baud { self.core.byte_cycles() } else { SENT_BYTE_CYCLES }
     }
 
-    /// From now on sent bytes use the rate of the chip's UART instead of 115,200 baud: a bootloader may have another
-    /// rate.
+    /// From now on bytes are sent at the rate of the chip's UART: a bootloader may have another one than [`BAUD`].
     pub fn follow_baud(&mut self) {
         self.follows_baud = true;
     }
@@ -312,14 +301,6 @@ impl Uno {
     /// Sent bytes that have not reached the receiver yet.
     pub fn bytes_pending(&self) -> usize {
         self.to_send.len()
-    }
-
-    /// Pushes up to 63 bytes into the receiver at once, faster than any line could. simavr buffers them and passes them
-    /// on one by one.
-    pub fn send_at_once(&mut self, bytes: &[u8]) {
-        for &byte in bytes {
-            self.core.flood(byte);
-        }
     }
 
     /// Sent bytes that the receiver had no room for, because the firmware did not read in time.
@@ -338,8 +319,7 @@ impl Uno {
         String::from_utf8_lossy(&bytes).into_owned()
     }
 
-    /// Takes the edges of the output pins: from now on [`Uno::changes`] begins with the next one. This limits the
-    /// memory of an Uno that runs for days.
+    /// Takes the edges of the output pins out of [`Uno::changes`], so that an Uno can run for days.
     pub fn take_changes(&mut self) -> Vec<PinChange> {
         std::mem::take(&mut self.core.recorder_mut().log.changes)
     }
@@ -379,8 +359,7 @@ impl Uno {
         self.core.recorder().log.turns.turns.as_ref()
     }
 
-    /// A variable's bytes in SRAM, by its symbol: in Rust the path from the crate on. `None` if there is no such
-    /// symbol.
+    /// A variable's bytes in SRAM, by its symbol: in Rust the path from the crate on. `None` without such a symbol.
     pub fn read(&self, symbol: &str) -> Option<&[u8]> {
         let &Variable { address, size } = self.image.variables.get(symbol)?;
         self.core.sram().get(in_sram(address, size.into())?)
@@ -389,7 +368,6 @@ impl Uno {
     /// Puts bytes into a variable from its first byte on, as bits that fall over would. It is named as in [`Uno::read`].
     ///
     /// # Errors
-    ///
     /// If there is no such symbol, or more bytes than it has.
     pub fn write(&mut self, symbol: &str, bytes: &[u8]) -> Result<(), UnoError> {
         let length = bytes.len();
@@ -402,7 +380,6 @@ impl Uno {
     /// Puts bytes into SRAM from an address of the data space on.
     ///
     /// # Errors
-    ///
     /// If they do not fit into SRAM, which is from 0x0100 to 0x08FF.
     pub fn write_sram(&mut self, address: u16, bytes: &[u8]) -> Result<(), UnoError> {
         let sram = self.core.sram_mut();

@@ -1,15 +1,15 @@
 //! A bootloader, read from its HEX file or compiled.
 //!
 //! A bootloader is at the end of the flash, and every reset starts it. If it receives new firmware in time it writes
-//! that, otherwise it starts the present firmware. Its address limits the flash for the firmware. This module does not
-//! run a bootloader; [`Uno`](crate::Uno) does.
+//! that, otherwise it starts the present firmware. [`Uno`](crate::Uno) runs it.
 
 use crate::elf::Image;
 use crate::error::UnoError;
 use crate::file_error::FileError;
-use crate::hex::pieces;
+use crate::hex;
 use crate::memory::FLASH_BYTES;
 use std::fmt::Display;
+use std::ops::Range;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
@@ -38,10 +38,11 @@ impl Bootloader {
         let wrong = |problem: String| FileError::new(path, problem);
         let right = "take a bootloader's .hex, such as ATmegaBOOT_168_atmega328.hex";
         let text = String::from_utf8_lossy(&FileError::bytes(path)?).into_owned();
-        let pieces = pieces(&text).map_err(|reason| wrong(format!("is no Intel HEX file: {reason}; {right}")))?;
-        let start = pieces.iter().map(|(address, _)| *address).min();
-        let start = start.ok_or_else(|| wrong(format!("is empty: {right}")))?;
-        let end = pieces.iter().map(|(address, bytes)| address + bytes.len()).max().unwrap_or(start);
+        let filled = hex::filled(&text).map_err(|reason| wrong(format!("is no Intel HEX file: {reason}; {right}")))?;
+        let (Range { start, end }, flash) = filled;
+        if end == 0 {
+            return Err(wrong(format!("is empty: {right}")));
+        }
         let fits = end <= FLASH_BYTES && BOOT_SECTION_BYTES.contains(&FLASH_BYTES.wrapping_sub(start));
         let Some(start_address) = u16::try_from(start).ok().filter(|_| fits) else {
             return Err(wrong(format!(
@@ -49,11 +50,7 @@ impl Bootloader {
                  0x7000, 0x7800, 0x7c00 or 0x7e00 and end by 0x8000"
             )));
         };
-        let mut code = vec![0xFF; end - start];
-        for (address, bytes) in pieces {
-            code[address - start..][..bytes.len()].copy_from_slice(&bytes);
-        }
-        Ok(Bootloader { start: start_address, code })
+        Ok(Bootloader { start: start_address, code: flash[start..end].to_vec() })
     }
 
     /// Compiles Optiboot, the Uno's own bootloader. The file of it that Debian has ready is longer than its boot section.

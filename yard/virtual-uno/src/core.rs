@@ -21,12 +21,6 @@ pub(crate) mod recorder;
 mod timer;
 mod uart;
 
-use std::ffi::c_void;
-use std::ptr::{self, NonNull};
-use std::{mem, slice};
-
-use simavr_ffi as simavr;
-
 use self::adc::{ADC_CHANNELS, SUPPLY_MILLIVOLTS};
 use self::chip::Chip;
 use self::eeprom::Eeprom;
@@ -38,6 +32,10 @@ use self::timer::Timer1;
 use crate::error::UnoError;
 use crate::memory::{EEPROM_BYTES, FLASH_BYTES};
 use crate::pins::{CYCLES_PER_SECOND, Pin};
+use simavr_ffi as simavr;
+use std::ffi::c_void;
+use std::ptr::{self, NonNull};
+use std::{mem, slice};
 
 unsafe extern "C" {
     /// Runs the next instruction. It is declared in sim_core.h, which simavr-ffi leaves out of its bindings.
@@ -132,8 +130,8 @@ impl Core {
         let parameter = recorder.as_ptr().cast::<c_void>();
 
         // SAFETY: `avr` is valid and initialised. Each `avr_io_getirq` names a peripheral that the chip
-        // has, and simavr ignores a null for a vector that it lacks. The callbacks get the recorder's address, which
-        // stays valid until `Drop` has ended the chip.
+        // has, and simavr ignores a null for a vector that it lacks. The callbacks get the address of the recorder,
+        // its timer or its EEPROM, which stays valid until `Drop` has ended the chip.
         unsafe {
             (*avr).custom.data = parameter;
             (*avr).reset = Some(on_reset);
@@ -151,8 +149,10 @@ impl Core {
             }
             listen(request(b"adc0"), simavr::ADC_IRQ_OUT_TRIGGER, on_sample);
             listen(request(b"uar0"), simavr::UART_IRQ_OUTPUT, on_transmit);
-            timer::take_over_writes(chip, &raw mut (*recorder.as_ptr()).timer);
-            eeprom::take_over_writes(chip, &raw mut (*recorder.as_ptr()).eeprom);
+            let (timer, eeprom) = (&raw mut (*recorder.as_ptr()).timer, &raw mut (*recorder.as_ptr()).eeprom);
+            chip.replace_writer(timer::OCR1AL, timer::on_compare_write, timer.cast());
+            chip.replace_writer(timer::TCNT1L, timer::on_counter_write, timer.cast());
+            chip.replace_writer(eeprom::EECR, eeprom::on_control_write, eeprom.cast());
             for vector in 1..=LAST_VECTOR {
                 let irq = simavr::avr_get_interrupt_irq(avr, vector);
                 if !irq.is_null() {
@@ -168,7 +168,6 @@ impl Core {
         core
     }
 
-    /// Cycles since the first power-up.
     pub(super) fn cycle(&self) -> u64 {
         self.chip.cycle()
     }
@@ -179,26 +178,22 @@ impl Core {
         unsafe { (*self.chip.avr()).pc }
     }
 
-    /// The recorded events.
     pub(super) fn recorder(&self) -> &Recorder {
         // SAFETY: the recorder is valid for as long as `self` is. simavr is its only other user, and runs only in
         // methods that borrow `self` mutably.
         unsafe { self.recorder.as_ref() }
     }
 
-    /// The recorded events, for a caller that takes them.
     pub(super) fn recorder_mut(&mut self) -> &mut Recorder {
         // SAFETY: as in `recorder`.
         unsafe { self.recorder.as_mut() }
     }
 
-    /// Whether an interrupt's handler runs.
     pub(super) fn is_in_handler(&self) -> bool {
         // SAFETY: as in `program_counter`.
         unsafe { (*self.chip.avr()).interrupts.running_ptr > 0 }
     }
 
-    /// Where the program stands.
     pub(super) fn place(&self) -> Place {
         match self.next_instruction() {
             _ if self.is_in_handler() => Place::InHandler,
@@ -216,7 +211,6 @@ impl Core {
     /// run in one step. A step passes `until` at most by the length of its last instruction.
     ///
     /// # Errors
-    ///
     /// If the firmware crashed or halted for good.
     pub(super) fn step(&mut self, until: u64) -> Result<(), UnoError> {
         let avr = self.chip.avr();
@@ -275,8 +269,7 @@ impl Core {
         Ok(())
     }
 
-    /// Halts the core for a moment after a wake-up: by a level at a pin between two steps, or by a peripheral in the
-    /// last step.
+    /// Halts the core for a moment after a wake-up, by a pin between two steps or by a peripheral in the last step.
     fn add_wake_up(&mut self) {
         // SAFETY: as in `program_counter`.
         let chip = unsafe { &mut *self.chip.avr() };
@@ -312,8 +305,7 @@ impl Core {
         }
     }
 
-    /// Replaces the chip by one that powers up now. It has the same flash, EEPROM, recorded events, and levels at its
-    /// inputs.
+    /// Replaces the chip by one that powers up now, with the same flash, EEPROM, recorded events and input levels.
     pub(super) fn power_cycle(&mut self) {
         let (eeprom, cycle) = (self.eeprom(), self.cycle());
         // SAFETY: as in `program_counter`.
@@ -387,14 +379,8 @@ impl Core {
         Port::of(self.chip, port).pins & 1 << bit != 0
     }
 
-    /// Gives the receiver a byte whose stop bit has just ended. Returns whether it had room.
     pub(super) fn receive(&mut self, byte: u8) -> bool {
         uart::receive(self.chip, byte)
-    }
-
-    /// Gives the receiver a byte, independent of the line's pace and the receiver's room.
-    pub(super) fn flood(&mut self, byte: u8) {
-        uart::flood(self.chip, byte);
     }
 
     /// The EEPROM's content after a power failure now.
@@ -420,18 +406,15 @@ impl Core {
         unsafe { slice::from_raw_parts((*self.chip.avr()).flash, FLASH_BYTES) }
     }
 
-    /// Cycles of a byte on the serial line, as the chip's UART is set up.
     pub(super) fn byte_cycles(&self) -> u64 {
         uart::cycles_per_byte(self.chip)
     }
 
-    /// All of SRAM.
     pub(super) fn sram(&self) -> &[u8] {
         // SAFETY: SRAM lies inside `data`, which simavr owns and changes only in methods that borrow `self` mutably.
         unsafe { slice::from_raw_parts((*self.chip.avr()).data.add(SRAM_START.into()), SRAM_BYTES) }
     }
 
-    /// All of SRAM, to write to.
     pub(super) fn sram_mut(&mut self) -> &mut [u8] {
         // SAFETY: as in `sram`, and `self` is borrowed mutably.
         unsafe { slice::from_raw_parts_mut((*self.chip.avr()).data.add(SRAM_START.into()), SRAM_BYTES) }

@@ -3,9 +3,6 @@
 //! [`Image`] has the contents of flash and EEPROM, the memory that the program takes, and the addresses of its symbols.
 //! This module neither builds nor runs the firmware; [`Uno`](crate::Uno) runs it.
 
-use std::collections::HashMap;
-use std::path::Path;
-
 use crate::file_error::FileError;
 use crate::hex;
 use crate::memory::{EEPROM_BYTES, FLASH_BYTES};
@@ -13,6 +10,8 @@ use object::read::elf::{ElfFile32, ElfSymbol32, ProgramHeader};
 use object::{
     Architecture, LittleEndian, Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, SymbolKind, elf,
 };
+use std::collections::HashMap;
+use std::path::Path;
 
 /// Origins of SRAM, EEPROM and the following sections in the single address space of AVR ELF files.
 const SRAM_ORIGIN: u64 = 0x80_0000;
@@ -40,7 +39,6 @@ impl Size {
     /// The memory that the ELF at `path` takes, whether or not the chip has it.
     ///
     /// # Errors
-    ///
     /// Where the file cannot be read or is no ELF for AVR.
     pub fn read(path: &Path) -> Result<Size, FileError> {
         let bytes = FileError::bytes(path)?;
@@ -81,7 +79,6 @@ impl Image {
     /// Reads the ELF or the Intel HEX file at `path`. A HEX file has the flash alone.
     ///
     /// # Errors
-    ///
     /// Where the file cannot be read, is neither an ELF for AVR nor HEX, is for another chip, or holds more than the
     /// ATmega328P does.
     pub fn read(path: &Path) -> Result<Image, FileError> {
@@ -152,12 +149,9 @@ fn check_chip(path: &Path, file: &ElfFile32<LittleEndian>) -> Result<(), FileErr
 }
 
 fn size(file: &ElfFile32<LittleEndian>) -> Size {
-    let mut size = Size { flash: 0, sram: 0 };
+    let mut size = Size::default();
     for section in file.sections() {
-        let SectionFlags::Elf { sh_flags, .. } = section.flags() else {
-            continue;
-        };
-        if !sh_flags.contains(elf::SHF_ALLOC) {
+        if !matches!(section.flags(), SectionFlags::Elf { sh_flags, .. } if sh_flags.contains(elf::SHF_ALLOC)) {
             continue;
         }
         // Initial values have an address in flash. A section that the start-up code does not fill (.noinit) may have
@@ -167,15 +161,11 @@ fn size(file: &ElfFile32<LittleEndian>) -> Size {
             let in_flash = u64::from(header.p_paddr(LittleEndian)) < SRAM_ORIGIN;
             in_flash && (start..start + length).contains(&(section.address() as u32))
         });
-        match section.address() {
-            ..SRAM_ORIGIN => size.flash += section.size(),
-            SRAM_ORIGIN..EEPROM_ORIGIN => {
-                size.sram += section.size();
-                if is_loaded {
-                    size.flash += section.size();
-                }
-            }
-            _ => {}
+        if section.address() < SRAM_ORIGIN || is_loaded {
+            size.flash += section.size();
+        }
+        if (SRAM_ORIGIN..EEPROM_ORIGIN).contains(&section.address()) {
+            size.sram += section.size();
         }
     }
     size

@@ -1,8 +1,7 @@
 //! The board's pins, and levels on them at cycles.
 //!
 //! A [`Pin`] has the board's number. A [`PinChange`] is a new level of a pin, driven by either side. A [`Wire`]
-//! describes the connection of a pin. This module needs no simulator: programs that only write or check signals use the
-//! crate without its default features.
+//! describes the connection of a pin. This module is what the crate has without its default features.
 
 use std::fmt;
 
@@ -56,17 +55,6 @@ impl Pin {
             number @ 8..14 => ('B', number - 8),
             number => ('C', number - 14),
         }
-    }
-
-    /// The pin at a bit of a port; `None` if the board has none there.
-    pub const fn at(port: char, bit: u8) -> Option<Pin> {
-        let number = match (port, bit) {
-            ('D', 0..8) => bit,
-            ('B', 0..6) => bit + 8,
-            ('C', 0..6) => bit + 14,
-            _ => return None,
-        };
-        Some(Pin::ALL[number as usize])
     }
 
     /// The pin's channel of the ADC, 0 to 5; `None` for D0 to D13.

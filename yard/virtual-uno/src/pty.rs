@@ -99,8 +99,7 @@ impl Pty {
         Ok(())
     }
 
-    /// Whether a program has opened it since the last call, at a time when no other had it open. What was not read before
-    /// that is gone.
+    /// Whether a program has opened it since the last call, while no other had it open. Bytes not read before are gone.
     ///
     /// # Errors
     /// If it has failed.

@@ -1,18 +1,15 @@
 //! Recordings of the pins, as VCD files: [`read`] takes a logic analyser's, [`write()`] makes one for PulseView or GTKWave.
 //!
-//! Levels are at cycles of the Uno. The reader converts from any time unit of the file. The caller chooses channels by
-//! the names in the analyser's software. Nothing is filtered or repaired: an undefined level is an error. The firmware,
-//! not this module, interprets the signal.
+//! Levels are at cycles of the Uno, from any time unit of the file. The caller chooses channels by the names in the
+//! analyser's software. Nothing is filtered or repaired: an undefined level is an error.
 
+use crate::file_error::FileError;
+use crate::pins::{CYCLES_PER_SECOND, Pin, PinChange, Wire};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, ErrorKind, Read, Write};
 use std::path::Path;
-
 use vcd::{Command, IdCode, Parser, Scope, ScopeItem, SimulationCommand, TimescaleUnit, Value, Var, Writer};
-
-use crate::file_error::FileError;
-use crate::pins::{CYCLES_PER_SECOND, Pin, PinChange, Wire};
 
 /// Longest recording, in hours. The firmware would take days to play a longer one.
 const MOST_HOURS: u64 = 24;
@@ -41,7 +38,6 @@ struct Channel {
 /// scopes is written `scope.name`.
 ///
 /// # Errors
-///
 /// If the file is no VCD, has no such channels, or leaves their levels open.
 pub fn read(path: &Path, channels: &[(Pin, &str)]) -> Result<Vec<PinChange>, FileError> {
     let file = File::open(path).map_err(|source| FileError::unread(path, source))?;
@@ -72,43 +68,39 @@ fn parse(path: &Path, file: impl BufRead, channels: &[(Pin, &str)]) -> Result<Ve
     let mut changes = Vec::new();
     let mut time = 0;
     while let Some(command) = parser.next().transpose().map_err(read_error)? {
-        match command {
+        let line = parser.line();
+        let (wire, value) = match command {
             Command::Timestamp(later) if later < time => {
-                return Err(wrong(format!("goes back in time at line {}", parser.line())));
+                return Err(wrong(format!("goes back in time at line {line}")));
             }
-            Command::Timestamp(later) => time = later,
-            Command::ChangeScalar(..) | Command::ChangeVector(..) => {
-                let (wire, value) = match &command {
-                    Command::ChangeScalar(wire, value) => (*wire, Some(*value)),
-                    // Some programs write a single wire as a vector, too.
-                    Command::ChangeVector(wire, bits) => (*wire, bits.iter().last()),
-                    _ => continue,
-                };
-                let (Some(value), true) = (value, wires.contains_key(&wire)) else { continue };
-                let Some(channel) = wires.get_mut(&wire) else { continue };
-                let high = match value {
-                    Value::V0 => false,
-                    Value::V1 => true,
-                    Value::X | Value::Z => {
-                        return Err(wrong(format!(
-                            "has `{value}` on channel `{}` at line {}: only 0 and 1 are levels",
-                            channel.name,
-                            parser.line()
-                        )));
-                    }
-                };
-                if channel.level.replace(high) != Some(high) {
-                    let cycle = to_cycles(time, timescale);
-                    if cycle > MOST_HOURS * 3600 * CYCLES_PER_SECOND {
-                        return Err(wrong(format!(
-                            "is longer than {MOST_HOURS} h at line {}: cut the recording, or check its $timescale",
-                            parser.line()
-                        )));
-                    }
-                    changes.push(PinChange { cycle, pin: channel.pin, high });
-                }
+            Command::Timestamp(later) => {
+                time = later;
+                continue;
             }
-            _ => {}
+            Command::ChangeScalar(wire, value) => (wire, Some(value)),
+            // Some programs write a single wire as a vector, too.
+            Command::ChangeVector(wire, bits) => (wire, bits.iter().last()),
+            _ => continue,
+        };
+        let (Some(channel), Some(value)) = (wires.get_mut(&wire), value) else { continue };
+        let high = match value {
+            Value::V0 => false,
+            Value::V1 => true,
+            Value::X | Value::Z => {
+                let name = &channel.name;
+                return Err(wrong(format!(
+                    "has `{value}` on channel `{name}` at line {line}: only 0 and 1 are levels"
+                )));
+            }
+        };
+        if channel.level.replace(high) != Some(high) {
+            let cycle = to_cycles(time, timescale);
+            if cycle > MOST_HOURS * 3600 * CYCLES_PER_SECOND {
+                return Err(wrong(format!(
+                    "is longer than {MOST_HOURS} h at line {line}: cut the recording, or check its $timescale"
+                )));
+            }
+            changes.push(PinChange { cycle, pin: channel.pin, high });
         }
     }
     match wires.into_values().find(|channel| channel.level.is_none()) {
@@ -121,7 +113,6 @@ fn parse(path: &Path, file: impl BufRead, channels: &[(Pin, &str)]) -> Result<Ve
 /// starts at rest. Changes on other pins are left out. [`read`] returns exactly the same cycles.
 ///
 /// # Errors
-///
 /// The errors of the writer.
 pub fn write(file: impl Write, wires: &[Wire], changes: impl IntoIterator<Item = PinChange>) -> io::Result<()> {
     let mut changes: Vec<PinChange> = changes.into_iter().collect();
@@ -168,8 +159,7 @@ fn head(file: &mut impl BufRead) -> io::Result<io::Cursor<Vec<u8>>> {
         if rest.read_until(b'\n', &mut head)? == 0 {
             break;
         }
-        let words = head[start..].split(u8::is_ascii_whitespace);
-        for word in words {
+        for word in head[start..].split(u8::is_ascii_whitespace) {
             match word {
                 b"$scope" => scopes += 1,
                 b"$upscope" => scopes = scopes.saturating_sub(1),
@@ -277,8 +267,8 @@ mod tests {
         )
     }
 
-    fn levels(file: &str, channels: &[(Pin, &str)]) -> Result<Vec<(u64, Pin, bool)>, String> {
-        parse(Path::new("pins.vcd"), file.as_bytes(), channels)
+    fn levels(file: impl AsRef<[u8]>, channels: &[(Pin, &str)]) -> Result<Vec<(u64, Pin, bool)>, String> {
+        parse(Path::new("pins.vcd"), file.as_ref(), channels)
             .map(|changes| changes.iter().map(|change| (change.cycle, change.pin, change.high)).collect())
             .map_err(|error| error.to_string())
     }
@@ -295,7 +285,7 @@ mod tests {
 
     #[test]
     fn any_habits_of_other_programs_together_leave_the_levels_as_they_are() {
-        let expected = levels(&recording("1 us", "#0 0! 1\" #5 1!"), &CHANNELS).unwrap();
+        let expected = levels(recording("1 us", "#0 0! 1\" #5 1!"), &CHANNELS).unwrap();
         for habits in 0..1_u32 << 8 {
             let has = |habit: u32| habits >> habit & 1 == 1;
             let samples = match (has(0), has(1)) {
@@ -324,10 +314,8 @@ mod tests {
                 file.splice(0..0, *b"\xEF\xBB\xBF");
             }
             let channels = [(Pin::D2, names[0]), (Pin::D3, names[1])];
-            let changes = parse(Path::new("pins.vcd"), &*file, &channels)
-                .unwrap_or_else(|error| panic!("{habits:#b}: {error:?}: {}", String::from_utf8_lossy(&file)));
-            let found: Vec<_> = changes.iter().map(|change| (change.cycle, change.pin, change.high)).collect();
-            assert_eq!(found, expected, "{habits:#b}");
+            let shown = String::from_utf8_lossy(&file);
+            assert_eq!(levels(&file, &channels).as_ref(), Ok(&expected), "{habits:#b}: {shown}");
         }
     }
 
@@ -377,7 +365,7 @@ mod tests {
 
     #[test]
     fn a_recording_that_would_never_end_or_is_nested_without_end_is_refused() {
-        let endless = levels(&recording("1 s", "#0 0! 0\"\n#18446744073709551615 1!"), &CHANNELS).unwrap_err();
+        let endless = levels(recording("1 s", "#0 0! 0\"\n#18446744073709551615 1!"), &CHANNELS).unwrap_err();
         assert!(endless.contains("pins.vcd is longer than 24 h at line 9"), "{endless}");
         let nested = "$timescale 1 us $end\n".to_owned() + &"$scope module a $end\n".repeat(100_000);
         let error = parse(Path::new("pins.vcd"), nested.as_bytes(), &CHANNELS).unwrap_err();

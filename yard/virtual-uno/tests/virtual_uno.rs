@@ -82,18 +82,6 @@ fn bytes_that_waited_interrupt_one_right_after_the_other() {
     assert_eq!(uno.read("last"), Some(&b"3"[..]));
 }
 
-#[test]
-fn a_flood_reaches_the_firmware_to_the_last_byte() {
-    let mut uno = boot("backlog");
-    uno.set(Pin::D4, false);
-    uno.run_for_ms(1).unwrap();
-    let flood: Vec<u8> = (1..=63).collect();
-    uno.send_at_once(&flood);
-    uno.run_for_ms(1).unwrap();
-    assert_eq!(uno.read("taken"), Some(&[63][..]));
-    assert_eq!(uno.read("last"), Some(&[63][..]));
-}
-
 /// Cycles from each of 20 edges on INT0 to the first instruction of its handler.
 fn responses(uno: &mut Uno) -> Vec<u64> {
     uno.run_for_ms(1).unwrap();

@@ -128,10 +128,10 @@ impl Guide {
     pub(super) fn measure_wheel(&mut self, length_mm: u16) -> Result<()> {
         if settings::read(&mut self.link)?.get(Setting::TicksPerM) == 0 {
             // They were of another wheel.
-            self.state.measured.forget_stretches();
+            self.state.measured.ticks_per_m.clear();
         }
         loop {
-            let stretches = self.state.measured.stretches();
+            let stretches = self.state.measured.ticks_per_m.len();
             if stretches >= SetUp::STRETCHES {
                 return self.push(&[]);
             }

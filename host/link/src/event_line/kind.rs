@@ -46,7 +46,6 @@ pub(crate) fn warning(word: &str) -> Option<Warning> {
     Warning::find(word.as_bytes())
 }
 
-/// The value with this name.
 fn named<T: Copy, const N: usize>(word: &str, all: [T; N], name: fn(T) -> Text) -> Option<T> {
     all.into_iter().find(|&one| name(one).to_string() == word)
 }

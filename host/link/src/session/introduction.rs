@@ -57,13 +57,7 @@ impl Session {
     }
 
     /// Takes the answer to a first question, and goes on to the next one.
-    pub(super) fn take_first_answer(
-        &mut self,
-        question: usize,
-        command: String,
-        answer: Vec<String>,
-        refusal: Option<String>,
-    ) {
+    pub(super) fn take_first_answer(&mut self, question: usize, answer: Vec<String>, refusal: Option<String>) {
         let version = answer.last().and_then(|line| match ConsoleLine::parse(line) {
             ConsoleLine::Version { version } if refusal.is_none() => Some(version),
             _ => None,
@@ -75,9 +69,12 @@ impl Session {
             _ => refusal.is_some(),
         };
         if is_wrong {
+            let command = || INTRODUCTION[question].to_owned();
             let error = match refusal {
                 None if question == 0 => LinkError::NotTheWeeder(answer.join(" ")),
-                refusal => LinkError::Refused { command, answer: refusal.unwrap_or_else(|| answer.join(" ")) },
+                refusal => {
+                    LinkError::Refused { command: command(), answer: refusal.unwrap_or_else(|| answer.join(" ")) }
+                }
             };
             if question > 1 || self.introduction.late == 0 {
                 return self.ask_again(error);
@@ -85,8 +82,8 @@ impl Session {
             // The answer to an earlier question: the one to this is still to come.
             self.introduction.late -= 1;
             self.introduction.wrong = Some(error);
-            let (line, since) = (INTRODUCTION[question].to_owned(), self.waited);
-            return self.asked.push_front(Asked { line, number: None, since, answer: Vec::new() });
+            let again = Asked { line: command(), number: None, since: self.waited, answer: Vec::new() };
+            return self.asked.push_front(again);
         }
         match (question, version) {
             (0, Some(version)) => self.version = version,

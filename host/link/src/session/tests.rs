@@ -6,24 +6,37 @@ use crate::{Link, Wire};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rig::ScriptedBoard;
+use std::assert_matches;
 use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::rc::Rc;
 
+/// The answer to `status` in HOLD.
+const IS_IN_HOLD: &str = "state=hold tool=out pos=0 speed_mm_s=0 windows=0 unseen_mm=400\r\nok\r\n";
+
+/// The greeting after a brown-out.
+const RESTARTS: &[u8] = b"weeder 0.2.0, reset by brown_out, state hold, tool out; help lists the commands\r\n";
+
 /// A connection to a board, at a time.
 struct Talk {
     connection: Connection,
     board: ScriptedBoard,
+    /// How often the port was opened.
+    opened: Rc<Cell<usize>>,
     now: Moment,
 }
 
 impl Talk {
     /// A connection that waits for a board.
     fn waiting(board: ScriptedBoard) -> Self {
-        let port = board.clone();
-        let open = move || Ok(Wire::over(port.open().ok_or(LinkError::Absent("it".to_owned()))?, false));
-        Self { connection: Connection::waiting_for(open), board, now: Moment::default() }
+        let (port, opened) = (board.clone(), Rc::new(Cell::new(0)));
+        let count = Rc::clone(&opened);
+        let open = move || {
+            count.set(count.get() + 1);
+            Ok(Wire::over(port.open().ok_or(LinkError::Absent("it".to_owned()))?, false))
+        };
+        Self { connection: Connection::waiting_for(open), board, opened, now: Moment::default() }
     }
 
     /// A connection that has reported its machine.
@@ -74,7 +87,7 @@ fn answered(line: &str) -> Happening {
 #[test]
 fn commands_are_answered_one_after_the_other_beside_the_status() {
     let mut talk = Talk::waiting(ScriptedBoard::plugged_in());
-    assert!(matches!(talk.second().as_slice(), [Happening::Connected { .. }]));
+    assert_matches!(talk.second().as_slice(), [Happening::Connected { .. }]);
     assert!(talk.command("hold") && talk.command("hepl") && !talk.session().is_idle());
     let unknown = answered("error: no such command, help lists them all");
     assert_eq!(talk.second(), [typed("hold"), answered("ok"), typed("hepl"), unknown]);
@@ -102,11 +115,9 @@ fn settings_are_asked_for_again_after_every_change() {
         assert!(shown.iter().any(|shown| shown.starts_with(&line)), "{shown:?}");
     }
     talk.board.say(b"calibrated lead_out_ms=150 lead_in_ms=40 set=yes\r\n");
-    let happened = talk.second();
-    assert!(matches!(happened.as_slice(), [Happening::Event(..), Happening::Settings(..)]), "{happened:?}");
+    assert_matches!(talk.second().as_slice(), [Happening::Event(..), Happening::Settings(..)]);
     assert!(talk.command("set wheel_mm 9"));
-    let happened = talk.second();
-    assert!(matches!(happened.as_slice(), [Happening::Command(_), Happening::Answer(_)]), "{happened:?}");
+    assert_matches!(talk.second().as_slice(), [Happening::Command(_), Happening::Answer(_)]);
 }
 
 #[test]
@@ -114,7 +125,7 @@ fn examples_are_asked_for_again_behind_a_command_that_changes_them() {
     let mut talk = Talk::connected();
     for command in ["label plant", "label weed force", "teach plant", "forget 3", "forget all"] {
         assert!(talk.command(command));
-        assert!(matches!(talk.second().last(), Some(Happening::Examples(_))), "{command}");
+        assert_matches!(talk.second().last(), Some(Happening::Examples(_)), "{command}");
     }
 }
 
@@ -124,12 +135,8 @@ fn hold_drops_nothing_that_the_session_asks_for_itself() {
     assert!(talk.command("set wheel_mm 405"));
     assert_eq!(talk.turn(), [typed("set wheel_mm 405")]);
     talk.session().hold();
-    let happened = talk.second();
     let held = [answered("ok"), typed("hold"), answered("ok")];
-    assert!(
-        matches!(happened.split_last(), Some((Happening::Settings(..), before)) if *before == held),
-        "{happened:?}"
-    );
+    assert_matches!(talk.second().split_last(), Some((Happening::Settings(..), before)) if *before == held);
 }
 
 #[test]
@@ -168,34 +175,25 @@ fn an_uno_that_is_unplugged_or_never_was_there_is_lost_once_and_found_later() {
     unplugged.board.plug(false);
     let absent = Talk::waiting(ScriptedBoard::default());
     for (mut talk, problem) in [(unplugged, "plug the Uno in again"), (absent, "there is no port it")] {
-        let lost = talk.second();
-        assert!(matches!(lost.as_slice(), [Happening::Lost(why)] if why.contains(problem)), "{lost:?}");
+        assert_matches!(talk.second().as_slice(), [Happening::Lost(why)] if why.contains(problem));
         assert!(!talk.session().is_connected());
         assert_eq!(talk.second(), []);
         talk.board.plug(true);
         let found = [talk.second(), talk.second()].concat();
-        assert!(matches!(found.as_slice(), [Happening::Connected { .. }]), "{found:?}");
+        assert_matches!(found.as_slice(), [Happening::Connected { .. }]);
     }
 }
 
 #[test]
 fn an_answer_that_does_not_come_is_given_up_and_the_port_stays_open() {
-    let board = ScriptedBoard::plugged_in();
-    let (port, opened) = (board.clone(), Rc::new(Cell::new(0)));
-    let count = Rc::clone(&opened);
-    // Opening a real port resets its Uno, which may be at work.
-    let open = move || {
-        count.set(count.get() + 1);
-        Ok(Wire::over(port.open().expect("it is plugged in"), false))
-    };
-    let mut talk = Talk { connection: Connection::waiting_for(open), board, now: Moment::default() };
-    talk.second();
+    let mut talk = Talk::connected();
     assert!(talk.command("silence"));
     let happened: Vec<_> = (0..6).flat_map(|_| talk.second()).collect();
     let lost = happened.iter().position(|happening| matches!(happening, Happening::Lost(_)));
     let found = happened.iter().position(|happening| matches!(happening, Happening::Connected { .. }));
     assert!(lost.is_some() && lost < found, "{happened:?}");
-    assert_eq!((opened.get(), talk.session().is_idle()), (1, true));
+    // Opening a real port resets its Uno, which may be at work.
+    assert_eq!((talk.opened.get(), talk.session().is_idle()), (1, true));
 }
 
 #[test]
@@ -252,16 +250,13 @@ fn after_a_reset_everything_is_asked_again_and_commands_from_before_it_are_not_e
     assert!(talk.command("start"));
     talk.session().hold();
     assert!(talk.command("start"));
-    talk.board.say(b"weeder 0.2.0, reset by brown_out, state hold, tool out; help lists the commands\r\n");
+    talk.board.say(RESTARTS);
     let mut happened = talk.second();
     let ends: Vec<(u64, Unanswered)> = happened
         .extract_if(.., |happening| matches!(happening, Happening::Unanswered { .. }))
         .filter_map(|end| if let Happening::Unanswered { number, why, .. } = end { Some((number, why)) } else { None })
         .collect();
-    assert!(
-        matches!(happened.as_slice(), [Happening::Started { .. }, Happening::Lost(_), Happening::Connected { .. }]),
-        "{happened:?}"
-    );
+    assert_matches!(&happened[..], [Happening::Started { .. }, Happening::Lost(_), Happening::Connected { .. }]);
     let why = "the Uno was reset (brown_out)".to_owned();
     let [unknown, not_typed] = [Unanswered::Unknown(why.clone()), Unanswered::NotTyped(why)];
     assert_eq!(ends, [(2, Unanswered::Held), (1, unknown), (4, not_typed.clone()), (3, not_typed)]);
@@ -278,32 +273,28 @@ fn restart_at_work(happened: &[Happening]) -> Option<&str> {
 
 #[test]
 fn a_restart_at_work_is_reported_with_its_cause_and_one_in_hold_is_not() {
-    let greeting = b"weeder 0.2.0, reset by brown_out, state hold, tool out; help lists the commands\r\n";
     let mut talk = Talk::connected();
-    talk.board.say(greeting);
+    talk.board.say(RESTARTS);
     assert_eq!(restart_at_work(&talk.second()), None);
     for at_work in [&b"state is=work\r\n"[..], b"state is=hold\r\nstate is=work\r\n"] {
         // The line before it may be cut.
-        talk.board.say(&[at_work, b"state=wo", greeting].concat());
+        talk.board.say(&[at_work, b"state=wo", RESTARTS].concat());
         let happened = talk.second();
         assert_eq!(restart_at_work(&happened), Some("brown_out"), "{happened:?}");
         assert_eq!(restart_at_work(&talk.second()), None);
     }
     // What happened before the session, only the machine knows.
-    let told = b"weeder 0.2.0, reset by reset_pin, was work, state hold, tool out; help lists the commands\r\n";
-    talk.board.say(told);
+    talk.board.say(b"weeder 0.2.0, reset by reset_pin, was work, state hold, tool out; help lists the commands\r\n");
     assert_eq!(restart_at_work(&talk.second()), Some("reset_pin"));
-    talk.board.say(&[&b"state is=work\r\nalarm code=3-1 name=too_fast pos=1\r\n"[..], greeting].concat());
+    talk.board.say(&[b"state is=work\r\nalarm code=3-1 name=too_fast pos=1\r\n", RESTARTS].concat());
     assert_eq!(restart_at_work(&talk.second()), None);
 }
 
 #[test]
 fn an_answer_to_an_earlier_question_is_taken_for_no_other_and_the_machine_is_asked_again() {
-    let late = b"state=hold tool=out pos=0 speed_mm_s=0 windows=0 unseen_mm=400\r\nok\r\n";
-    let greeting = b"weeder 0.2.0, reset by watchdog, state hold, tool out; help lists the commands\r\n";
     for count in 0..4 {
         let mut talk = Talk::connected();
-        talk.board.say(&[&greeting[..], &late.repeat(count)].concat());
+        talk.board.say(&[RESTARTS, IS_IN_HOLD.repeat(count).as_bytes()].concat());
         let happened = [talk.second(), talk.second()].concat();
         let connected = happened.iter().filter(|happening| matches!(happening, Happening::Connected { .. })).count();
         assert!(connected == 1 && talk.session().is_connected(), "{count}: {happened:?}");
@@ -323,8 +314,7 @@ fn a_command_is_typed_before_its_deadline_or_not_at_all() {
     talk.board.say(b"ok\r\n");
     let happened = talk.second();
     let late = Happening::Unanswered { number: start, command: "start".to_owned(), why: Unanswered::Late };
-    let expected = [answered("ok"), late, typed("clear"), answered("ok")];
-    assert_eq!(happened, expected);
+    assert_eq!(happened, [answered("ok"), late, typed("clear"), answered("ok")]);
     assert!(!talk.board.typed().contains(&"start".to_owned()));
 }
 
@@ -373,8 +363,7 @@ fn where_an_answer_may_be_late_hold_is_typed_at_once_and_again_behind_the_first_
     }
     let number = session.hold();
     assert_eq!(sends(&mut session, &mut now, ""), "hold\n");
-    let status = "state=hold tool=out pos=0 speed_mm_s=0 windows=0 unseen_mm=400\r\nok\r\n";
-    let answers = [("", "version\n"), ("ok\r\n", ""), ("weeder 0.2.0\r\nok\r\n", "status\n"), (status, "hold\n")];
+    let answers = [("", "version\n"), ("ok\r\n", ""), ("weeder 0.2.0\r\nok\r\n", "status\n"), (IS_IN_HOLD, "hold\n")];
     for (received, sent) in answers {
         assert_eq!(sends(&mut session, &mut now, received), sent, "behind {received:?}");
     }
@@ -390,6 +379,20 @@ struct Known {
     ends: usize,
 }
 
+/// A command's end: its number, and which end it is.
+fn end_of(happening: &Happening) -> Option<(u64, usize)> {
+    match happening {
+        Happening::Answered { number, .. } => Some((*number, 0)),
+        Happening::Unanswered { number, why, .. } => match why {
+            Unanswered::Late => Some((*number, 1)),
+            Unanswered::Held => Some((*number, 2)),
+            Unanswered::NotTyped(_) => Some((*number, 3)),
+            Unanswered::Unknown(_) => Some((*number, 4)),
+        },
+        _ => None,
+    }
+}
+
 #[test]
 fn every_command_has_one_end_and_none_is_typed_that_ends_as_not_typed() {
     let seed = std::env::var("WEEDER_SEED").map_or(1, |seed| seed.parse().unwrap());
@@ -402,10 +405,10 @@ fn every_command_has_one_end_and_none_is_typed_that_ends_as_not_typed() {
         "weeder 0.2.0\r\nok\r\n",
         "k=3 from 1 to 15, default 3, not saved\r\nok\r\n",
         "spoiled=0\r\nok\r\n",
-        "state=hold tool=out pos=0 speed_mm_s=0 windows=0 unseen_mm=400\r\nok\r\n",
+        IS_IN_HOLD,
         "error: no such command\r\n",
         "swing tool=out pos=9\r\n",
-        "weeder 0.2.0, reset by brown_out, state hold, tool out; help lists the commands\r\n",
+        str::from_utf8(RESTARTS).unwrap(),
         "\u{1}\u{7f}~",
         "",
     ];
@@ -444,18 +447,8 @@ fn every_command_has_one_end_and_none_is_typed_that_ends_as_not_typed() {
             let turn = session.turn(now, if is_heard { received.as_bytes() } else { b"" });
             let sent = String::from_utf8(turn.to_send).unwrap();
             for happening in turn.happened {
-                let (number, end) = match happening {
-                    Happening::Answered { number, .. } => (number, 0),
-                    Happening::Unanswered { number, why: Unanswered::Late, .. } => (number, 1),
-                    Happening::Unanswered { number, why: Unanswered::Held, .. } => (number, 2),
-                    Happening::Unanswered { number, why: Unanswered::NotTyped(_), .. } => (number, 3),
-                    Happening::Unanswered { number, why: Unanswered::Unknown(_), .. } => (number, 4),
-                    Happening::Connected { .. } => {
-                        connections += 1;
-                        continue;
-                    }
-                    _ => continue,
-                };
+                connections += usize::from(matches!(happening, Happening::Connected { .. }));
+                let Some((number, end)) = end_of(&happening) else { continue };
                 ends[end] += 1;
                 if let Some(known) = known.get_mut(&number) {
                     known.ends += 1;
@@ -470,10 +463,8 @@ fn every_command_has_one_end_and_none_is_typed_that_ends_as_not_typed() {
             }
         }
         session.lose(LinkError::Noise);
-        for happening in session.turn(now, b"").happened {
-            if let Happening::Unanswered { number, .. } = happening
-                && let Some(known) = known.get_mut(&number)
-            {
+        for (number, _) in session.turn(now, b"").happened.iter().filter_map(end_of) {
+            if let Some(known) = known.get_mut(&number) {
                 known.ends += 1;
             }
         }

@@ -14,7 +14,6 @@ use control::memory::Volatile;
 use link::examples::Taught;
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
-use std::rc::Rc;
 
 /// Tolerance of the machine's own speed against the log's speeds around it, in mm/s.
 const SPEED_SLACK_MM_S: i32 = 25;
@@ -33,16 +32,29 @@ pub(super) struct Seen {
     pub(super) is_given: bool,
 }
 
-/// The log's values that the classifier uses.
-#[derive(Debug, Default)]
-pub(super) struct Witness {
-    /// The detection that was in the beam last.
+/// The firmware's classifier, with values from the log. A replay lists no examples, and ends where one is forgotten.
+pub(super) struct ReplayClassifier<'a> {
+    nearest: Nearest<&'a [Taught], Volatile>,
+    /// The log's values for the detection that was in the beam last.
     pub(super) seen: Cell<Option<Seen>>,
     /// The machine's slowest and fastest speed about here, in mm/s.
     pub(super) speeds_mm_s: Cell<(i32, i32)>,
+    /// The last detections: the replay's features, and the machine's features.
+    described: RefCell<VecDeque<(Features, Features)>>,
 }
 
-impl Witness {
+impl<'a> ReplayClassifier<'a> {
+    /// A classifier with a log's built-in examples and those from the field.
+    pub(super) fn new(built_in: &'a [Taught], field: &[Taught]) -> Self {
+        let mut nearest = Nearest::new(built_in, Volatile::new());
+        for &example in field {
+            // Any machine has room for as many.
+            let _ = nearest.keep(example);
+            while !nearest.carry_on() {}
+        }
+        Self { nearest, seen: Cell::default(), speeds_mm_s: Cell::default(), described: RefCell::default() }
+    }
+
     /// The possible speed classes of the machine.
     fn speed_classes(&self) -> impl Iterator<Item = i16> {
         let class = |speed: i32| features::speed_class(speed.clamp(i16::MIN.into(), i16::MAX.into()) as i16);
@@ -50,25 +62,6 @@ impl Witness {
         let slowest = class(slowest.saturating_sub(SPEED_SLACK_MM_S));
         let fastest = class(fastest.saturating_add(SPEED_SLACK_MM_S));
         features::SPEED_CLASSES_MM_S.into_iter().filter(move |class| (slowest..=fastest).contains(class))
-    }
-}
-
-/// The firmware's classifier, with values from the log. A replay lists no examples, and ends where one is forgotten.
-pub(super) struct ReplayClassifier<'a> {
-    /// The built-in examples alone. A label must not contradict them.
-    built_in: Nearest<&'a [Taught], Volatile>,
-    nearest: Nearest<&'a [Taught], Volatile>,
-    witness: Rc<Witness>,
-    /// The last detections: the replay's features, and the machine's features.
-    described: RefCell<VecDeque<(Features, Features)>>,
-}
-
-impl<'a> ReplayClassifier<'a> {
-    /// A classifier with a log's examples. The first `built_in` of them are those of the firmware.
-    pub(super) fn new(examples: &'a [Taught], built_in: usize, witness: Rc<Witness>) -> Self {
-        let nearest = |examples| Nearest::new(examples, Volatile::new());
-        let (built_in, all) = (nearest(&examples[..built_in]), nearest(examples));
-        Self { built_in, nearest: all, witness, described: RefCell::default() }
     }
 
     /// The machine's features for a detection with these features in the replay.
@@ -80,10 +73,10 @@ impl<'a> ReplayClassifier<'a> {
 
 impl Classifier for ReplayClassifier<'_> {
     fn classify(&self, features: &Features, k: u8) -> Vote {
-        let Some(seen) = self.witness.seen.get() else { return self.nearest.classify(features, k) };
+        let Some(seen) = self.seen.get() else { return self.nearest.classify(features, k) };
         let describe = |class| Features::describe(class, seen.spacing_mm, seen.width_mm);
         let as_logged =
-            self.witness.speed_classes().map(describe).find(|features| self.nearest.classify(features, k) == seen.vote);
+            self.speed_classes().map(describe).find(|features| self.nearest.classify(features, k) == seen.vote);
         let by_machine = as_logged.unwrap_or_else(|| describe(features.speed_mm_s()));
         let mut described = self.described.borrow_mut();
         described.truncate(OBJECTS - 1);
@@ -92,7 +85,7 @@ impl Classifier for ReplayClassifier<'_> {
     }
 
     fn built_in_class(&mut self, features: &Features) -> Class {
-        self.built_in.built_in_class(&self.by_machine(features))
+        self.nearest.built_in_class(&self.by_machine(features))
     }
 
     fn teach(&mut self, features: &Features, label: u8) -> Result<(), ExamplesFull> {
@@ -119,8 +112,7 @@ mod tests {
     fn a_label_is_refused_by_the_built_in_examples_alone() {
         let plant = Features::describe(556, 500, 150);
         let taught = Example::new(control::ground::examples::scale().quantise(plant.values()), label::WEED);
-        let examples = [&EXAMPLES[..], &[taught; 5]].concat();
-        let mut classifier = ReplayClassifier::new(&examples, EXAMPLES.len(), Rc::new(Witness::default()));
+        let mut classifier = ReplayClassifier::new(&EXAMPLES, &[taught; 5]);
         assert_eq!(classifier.classify(&plant, 3).class, Class::Weed, "the field has taught it so");
         assert_eq!(classifier.built_in_class(&plant), Class::Plant);
     }

@@ -49,10 +49,7 @@ pub(super) fn compare(logged: &[Heard], replays: &[&[Heard]], bounds: &Bounds, r
     };
     // At the very end an event may be in only one of log and replay: a detection is reported some distance behind it.
     let is_at_end = |heard: &Heard| match heard.event {
-        EventLine::Swing { position, .. } => {
-            let untold = bounds.untold.max(swing_ticks(heard, heard));
-            bounds.end.wrapping_sub(position).saturating_abs() <= untold
-        }
+        EventLine::Swing { position, .. } => near(position, bounds.end, bounds.untold.max(swing_ticks(heard, heard))),
         EventLine::Detection { position, hold, .. } => {
             (-FAR_TICKS..=DETECTION_TICKS).contains(&bounds.end.wrapping_sub(position.wrapping_add(hold)))
         }
@@ -61,13 +58,12 @@ pub(super) fn compare(logged: &[Heard], replays: &[&[Heard]], bounds: &Bounds, r
     // At the very beginning an event may lie within the limit in only one of log and replay.
     let is_at_beginning = |heard: &Heard| match heard.event {
         EventLine::Swing { position, .. } => {
-            bounds.compared_from > i32::MIN
-                && position.wrapping_sub(bounds.compared_from).saturating_abs() <= swing_ticks(heard, heard)
+            bounds.compared_from > i32::MIN && near(position, bounds.compared_from, swing_ticks(heard, heard))
         }
         // Both have it, but only one of them within the compared range.
         EventLine::Detection { position, .. } => {
             let is_heard = |heard_there: &[Heard]| heard_there.iter().any(|other| agree(heard, other));
-            position.wrapping_sub(bounds.first).saturating_abs() <= DETECTION_TICKS
+            near(position, bounds.first, DETECTION_TICKS)
                 && is_heard(logged)
                 && replays.iter().any(|replayed| is_heard(replayed))
         }
@@ -155,9 +151,12 @@ fn swing_ticks(logged: &Heard, replayed: &Heard) -> i32 {
     SWING_TICKS + logged.speed.abs().max(replayed.speed.abs()) * SWING_MS / 1000
 }
 
+fn near(one: i32, other: i32, ticks: i32) -> bool {
+    one.wrapping_sub(other).saturating_abs() <= ticks
+}
+
 /// Whether log and replay have the same event.
 fn agree(logged: &Heard, replayed: &Heard) -> bool {
-    let near = |one: i32, other: i32, ticks: i32| one.wrapping_sub(other).saturating_abs() <= ticks;
     match (logged.event, replayed.event) {
         (
             EventLine::Detection { class, position, votes, hold, .. },
@@ -181,10 +180,8 @@ fn describe(heard: Option<&Heard>) -> String {
         EventLine::Detection { class, position, votes, hold, .. } => {
             format!("`{} pos={position} votes={votes} hold={hold}`", names::class(class))
         }
-        EventLine::Swing { out, position } => format!("`swing tool={} pos={position}`", if out { "out" } else { "in" }),
-        EventLine::Alarm { alarm, position } => {
-            format!("`alarm {} pos={position}`", advice::name(alarm))
-        }
+        EventLine::Swing { out, position } => format!("`swing tool={} pos={position}`", names::place(out)),
+        EventLine::Alarm { alarm, position } => format!("`alarm {} pos={position}`", advice::name(alarm)),
         _ => "something else".to_owned(),
     }
 }

@@ -1,22 +1,21 @@
 //! Drives the decisions along a log: the machine's motion, the beam's edges, and the typed commands.
 
 use super::DETECTION_TICKS;
-use super::classifier::{ReplayClassifier, Seen, Witness};
+use super::classifier::{ReplayClassifier, Seen};
 use super::compare::Heard;
 use super::stretch::{Happened, Stretch};
 use control::alarm::Alarm;
 use control::ground::class::Vote;
-use control::ground::class::label;
 use control::measure::reset::Cause;
 use control::memory::Volatile;
 use control::operate::event::Event;
 use control::say::command::{Action, Command};
+use control::say::execute;
 use control::units::{Instant, Interval, Position, Ticks};
 use control::{measure::readings::Readings, operate::state::State};
 use link::settings::{Setting, steps};
 use link::{EventLine, Mode, Status};
 use rig::{Beams, Rig};
-use std::rc::Rc;
 
 /// Time between two steps of a machine at rest.
 const REST_MS: u32 = 5;
@@ -78,7 +77,6 @@ impl Pace {
 pub(super) struct Player<'a> {
     pace: Pace,
     rig: Rig<ReplayClassifier<'a>>,
-    witness: Rc<Witness>,
     /// The ground over which the beam was broken.
     canopies: Canopies,
     /// Steps so far, the same at every pace.
@@ -108,8 +106,7 @@ impl<'a> Player<'a> {
             stack_free: u16::MAX,
         };
         let beams = Beams { broken, second_broken: false };
-        let witness = Rc::new(Witness::default());
-        let classifier = ReplayClassifier::new(&stretch.examples, stretch.built_in, Rc::clone(&witness));
+        let classifier = ReplayClassifier::new(&stretch.built_in, &stretch.field);
         let mut rig = Rig::wake_at(classifier, Volatile::new(), readings, beams, Cause::Unknown);
         rig.clear();
         for (setting, value) in steps(rig.settings(), &stretch.settings) {
@@ -120,7 +117,6 @@ impl<'a> Player<'a> {
             pace,
             steps: 0,
             rig,
-            witness,
             canopies,
             speed_mm_s: stretch.first.speed_mm_s,
             heard: Vec::new(),
@@ -164,7 +160,10 @@ impl<'a> Player<'a> {
             self.speed_mm_s = to.speed_mm_s;
             // A line between the two may have moved it here already.
             if f64::from(to.speed_mm_s.saturating_abs()) < SURE_MM_S {
-                self.rest(host_ms.min(LONGEST_REST_MS));
+                for _ in 0..host_ms.min(LONGEST_REST_MS).div_ceil(u64::from(REST_MS)) {
+                    self.wait(Interval::from_ms(REST_MS));
+                    self.step();
+                }
             }
         } else if distance.saturating_abs() <= LONGEST_DISTANCE {
             self.roll_by(distance, to.speed_mm_s, host_ms);
@@ -203,7 +202,7 @@ impl<'a> Player<'a> {
         let (from, to) = (f64::from(from_mm_s), f64::from(to_mm_s));
         let mean = (from + to) / 2.0;
         let by_speed_s = distance_mm / mean;
-        self.witness.speeds_mm_s.set((from_mm_s.min(to_mm_s), from_mm_s.max(to_mm_s)));
+        self.rig.classifier().speeds_mm_s.set((from_mm_s.min(to_mm_s), from_mm_s.max(to_mm_s)));
         let host_s = (host_ms as f64 / 1000.0).max(distance_mm.abs() / MOST_MM_S);
         let is_known = by_speed_s > 0.0 && (by_speed_s < 3.0 * host_s.max(0.1) || mean.abs() > SURE_MM_S);
         let steps = distance.unsigned_abs();
@@ -219,13 +218,6 @@ impl<'a> Player<'a> {
             self.step();
         }
         self.speed_mm_s = to_mm_s;
-    }
-
-    fn rest(&mut self, time_ms: u64) {
-        for _ in 0..time_ms.div_ceil(u64::from(REST_MS)) {
-            self.wait(Interval::from_ms(REST_MS));
-            self.step();
-        }
     }
 
     fn wait(&mut self, interval: Interval) {
@@ -244,15 +236,11 @@ impl<'a> Player<'a> {
         if let Some(canopy) = canopy
             && !before.broken
         {
-            self.witness.seen.set(canopy.seen);
+            self.rig.classifier().seen.set(canopy.seen);
         }
         // An end switch without a fault.
         self.rig.readings.end_switch_on = self.rig.tool_out();
         self.rig.turn();
-        self.listen();
-    }
-
-    fn listen(&mut self) {
         let speed = self.speed();
         while let Some(event) = self.rig.next_event() {
             match event {
@@ -295,28 +283,23 @@ impl<'a> Player<'a> {
         is_given
     }
 
-    /// Executes a typed line. False if it cannot be replayed.
-    pub(super) fn command(&mut self, line: &str) -> bool {
-        let Ok(Command { action, setting, number, force }) = link::command(line) else { return true };
-        match action {
-            // If the log lacks the answer: the firmware refused what the replay refuses.
-            Action::Start | Action::StartNow => _ = self.rig.start(action == Action::StartNow),
-            Action::Hold => self.rig.hold(),
-            Action::Clear => self.rig.clear(),
+    /// Executes a command. False if it cannot be replayed.
+    pub(super) fn command(&mut self, command: &Command) -> bool {
+        match command.action {
             // The log lacks the second beam's edges.
-            Action::Set if setting == Setting::SecondBeamMm && number > 0 => return false,
-            Action::Set => _ = self.rig.set(setting, number),
-            Action::LabelPlant => _ = self.rig.label(label::PLANT, force),
-            Action::LabelWeed => _ = self.rig.label(label::WEED, force),
-            Action::Feature => self.rig.enter_feature(number as u8),
-            Action::TeachPlant => _ = self.rig.teach(label::PLANT),
-            Action::TeachWeed => _ = self.rig.teach(label::WEED),
-            Action::Forget | Action::ForgetAll => return false,
-            _ => {
-                let word = line.split_whitespace().next().unwrap_or_default().to_ascii_lowercase();
-                return !["servo", "calibrate", "test", "defaults", "revert"].contains(&&*word);
+            Action::Set if command.setting == Setting::SecondBeamMm && command.number > 0 => return false,
+            Action::Forget | Action::ForgetAll | Action::Defaults | Action::Revert => return false,
+            Action::CalibrateStart | Action::CalibrateServo | Action::Calibrate => return false,
+            Action::ServoIn | Action::ServoOut | Action::Servo | Action::TestRow | Action::TestWatchdog => {
+                return false;
             }
+            Action::Start | Action::StartNow | Action::Hold | Action::Clear | Action::Set => {}
+            Action::LabelPlant | Action::LabelWeed | Action::Feature | Action::TeachPlant | Action::TeachWeed => {}
+            // It changes nothing that the replay compares.
+            _ => return true,
         }
+        // If the log lacks the answer: the firmware refused what the replay refuses.
+        let _ = execute(command, &mut *self.rig);
         self.step();
         true
     }
@@ -324,80 +307,71 @@ impl<'a> Player<'a> {
 
 /// Ground over which the beam was broken.
 struct Canopy {
+    /// Its place in the log's order.
+    number: usize,
     from: i32,
     to: i32,
     /// The log's values, if it was classified.
     seen: Option<Seen>,
 }
 
-impl Canopy {
-    fn is_over(&self, ground: i32) -> bool {
-        ground.wrapping_sub(self.from) >= 0 && ground.wrapping_sub(self.to) < 0
-    }
-}
-
-/// The ground over which the beam was broken, as far as the log shows it.
-fn canopies(stretch: &Stretch) -> Vec<Canopy> {
-    let mut settings = stretch.settings.clone();
-    let mut canopies = Vec::new();
-    for (_, happened) in &stretch.happened {
-        let wheel = settings.wheel();
-        match happened {
-            Happened::Event(EventLine::Detection { class, position, votes, spacing, hold, .. }) => {
-                let width = hold.wrapping_sub(2 * wheel.ticks(settings.get(Setting::MarginMm)).0);
-                let seen = Seen {
-                    vote: Vote { class: *class, votes: *votes },
-                    spacing_mm: wheel.millimetres(Ticks(*spacing)),
-                    width_mm: wheel.millimetres(Ticks(width)),
-                    is_given: position.wrapping_sub(stretch.first.position) < 0,
-                };
-                canopies.push(Canopy { from: *position, to: position.wrapping_add(width), seen: Some(seen) });
-            }
-            // It is latched when the detection exceeds the greatest width.
-            Happened::Event(EventLine::Alarm { alarm: Alarm::BeamBlocked, position }) => {
-                let from = position.wrapping_sub(settings.ticks(Setting::MaxWidthMm).0 + 1);
-                canopies.push(Canopy { from, to: position.wrapping_add(1), seen: None });
-            }
-            Happened::Command(line) => {
-                // Later holds have the new margin.
-                if let Ok(Command { action: Action::Set, setting, number, .. }) = link::command(line) {
-                    let _ = settings.change(setting, number);
-                }
-            }
-            _ => {}
-        }
-    }
-    canopies
-}
-
-/// The ground over which the beam was broken, in the log's order, with an index: a day has 200 000 plants.
+/// The ground over which the beam was broken, as far as the log shows it: by where it begins, because a day has 200 000
+/// plants.
 struct Canopies {
     canopies: Vec<Canopy>,
     /// The stretch's beginning. Ground is compared as ticks from here, because a position wraps.
     first: i32,
-    /// Their numbers, by where they begin.
-    by_from: Vec<usize>,
     /// The widest of them in ticks.
     widest: i32,
 }
 
 impl Canopies {
     fn of(stretch: &Stretch) -> Self {
-        let (canopies, first) = (canopies(stretch), stretch.first.position);
-        let mut by_from: Vec<usize> = (0..canopies.len()).collect();
-        by_from.sort_by_key(|&number| canopies[number].from.wrapping_sub(first));
+        let (mut settings, first) = (stretch.settings.clone(), stretch.first.position);
+        let mut canopies = Vec::new();
+        for (number, (_, happened)) in stretch.happened.iter().enumerate() {
+            let wheel = settings.wheel();
+            match happened {
+                Happened::Event(EventLine::Detection { class, position, votes, spacing, hold, .. }) => {
+                    let width = hold.wrapping_sub(2 * wheel.ticks(settings.get(Setting::MarginMm)).0);
+                    let seen = Seen {
+                        vote: Vote { class: *class, votes: *votes },
+                        spacing_mm: wheel.millimetres(Ticks(*spacing)),
+                        width_mm: wheel.millimetres(Ticks(width)),
+                        is_given: position.wrapping_sub(first) < 0,
+                    };
+                    canopies.push(Canopy {
+                        number,
+                        from: *position,
+                        to: position.wrapping_add(width),
+                        seen: Some(seen),
+                    });
+                }
+                // It is latched when the detection exceeds the greatest width.
+                Happened::Event(EventLine::Alarm { alarm: Alarm::BeamBlocked, position }) => {
+                    let from = position.wrapping_sub(settings.ticks(Setting::MaxWidthMm).0 + 1);
+                    canopies.push(Canopy { number, from, to: position.wrapping_add(1), seen: None });
+                }
+                // Later holds have the new margin.
+                Happened::Command(Some(Command { action: Action::Set, setting, number, .. })) => {
+                    let _ = settings.change(*setting, *number);
+                }
+                _ => {}
+            }
+        }
+        canopies.sort_by_key(|canopy| canopy.from.wrapping_sub(first));
         let widest = canopies.iter().map(|canopy| canopy.to.wrapping_sub(canopy.from)).max().unwrap_or(0);
-        Self { canopies, first, by_from, widest }
+        Self { canopies, first, widest }
     }
 
     /// The first of them in the log over this ground.
     fn over(&self, ground: i32) -> Option<&Canopy> {
         let ticks = ground.wrapping_sub(self.first);
-        let from = |&number: &usize| self.canopies[number].from.wrapping_sub(self.first);
-        let begun = self.by_from.partition_point(|number| from(number) <= ticks);
+        let from = |canopy: &Canopy| canopy.from.wrapping_sub(self.first);
+        let begun = self.canopies.partition_point(|canopy| from(canopy) <= ticks);
         let near =
-            self.by_from[..begun].iter().rev().take_while(|number| ticks.wrapping_sub(from(number)) < self.widest);
-        let over = near.filter(|&&number| self.canopies[number].is_over(ground));
-        over.min().map(|&number| &self.canopies[number])
+            self.canopies[..begun].iter().rev().take_while(|canopy| ticks.wrapping_sub(from(canopy)) < self.widest);
+        let is_over = |canopy: &&Canopy| ground.wrapping_sub(canopy.from) >= 0 && ground.wrapping_sub(canopy.to) < 0;
+        near.filter(is_over).min_by_key(|canopy| canopy.number)
     }
 }

@@ -3,7 +3,7 @@
 
 use super::{DETECTION_TICKS, ReplayError};
 use crate::log::{Entry, Kind};
-use control::say::command::Action;
+use control::say::command::{Action, Command};
 use files::in_a_line;
 use link::examples::{Taught, taught};
 use link::settings::{Setting, Settings, shown};
@@ -11,23 +11,22 @@ use link::{ConsoleLine, EventLine, Mode, Status};
 use std::collections::VecDeque;
 
 /// The content of a log line.
-pub(super) enum Happened<'a> {
+pub(super) enum Happened {
     Status(Status),
     Event(EventLine),
-    Command(&'a str),
-    /// A command that the firmware answered with an error. It had no effect.
-    Refused,
+    /// A typed line; `None` if the firmware has refused it, or would: then it had no effect.
+    Command(Option<Command>),
 }
 
 /// A log from one start of the link to its end.
 pub(super) struct Stretch<'a> {
     pub(super) settings: Settings,
-    /// All examples, the built-in ones first, and the number of built-in ones.
-    pub(super) examples: Vec<Taught>,
-    pub(super) built_in: usize,
+    pub(super) built_in: Vec<Taught>,
+    /// The examples that were taught.
+    pub(super) field: Vec<Taught>,
     /// The first of its statuses.
     pub(super) first: Status,
-    pub(super) happened: Vec<(&'a Entry, Happened<'a>)>,
+    pub(super) happened: Vec<(&'a Entry, Happened)>,
     /// Notes on lines that only a newer version knows.
     pub(super) notes: Vec<String>,
 }
@@ -36,7 +35,7 @@ impl<'a> Stretch<'a> {
     /// Reads a stretch. `None` if the machine sent nothing.
     pub(super) fn read(entries: &'a [Entry]) -> Result<Option<Self>, ReplayError> {
         let mut settings = Settings::new();
-        let (mut examples, mut built_in) = (Vec::new(), 0);
+        let (mut built_in, mut field) = (Vec::new(), Vec::new());
         let mut happened = Vec::new();
         let mut notes: Vec<String> = Vec::new();
         let mut skip = |entry: &Entry, what: &str| {
@@ -46,6 +45,7 @@ impl<'a> Stretch<'a> {
                 notes.push(note);
             }
         };
+        let is_name = |text: &str| text.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
         // Indices in `happened` of commands without an answer so far. Answers come in the order of commands.
         let mut unanswered = VecDeque::new();
         for entry in entries {
@@ -54,51 +54,38 @@ impl<'a> Stretch<'a> {
                 ReplayError::Line { line: entry.number, problem }
             };
             match entry.kind {
-                Kind::Setting => {
-                    let Some((setting, value)) = shown(&entry.text) else {
-                        let name = entry.text.split('=').next().unwrap_or_default();
-                        if !name.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_') {
-                            return Err(wrong("no setting"));
-                        }
-                        skip(entry, "the setting");
-                        continue;
-                    };
+                Kind::Setting => match shown(&entry.text) {
                     // With another value than the machine's, the decisions are others.
-                    settings.set(setting, value).map_err(|_| wrong("out of the range of this version"))?;
-                }
-                Kind::Example => {
-                    // The list may end with the number of damaged examples.
-                    if entry.text.starts_with("spoiled=") {
-                        continue;
+                    Some((setting, value)) => {
+                        settings.set(setting, value).map_err(|_| wrong("out of the range of this version"))?;
                     }
-                    if matches!(EventLine::parse(&entry.text), Some(EventLine::Newer { .. })) {
-                        skip(entry, "the event");
-                        continue;
-                    }
-                    let (from_field, _, example) = taught(&entry.text).ok_or_else(|| wrong("no example"))?;
-                    examples.push(example);
-                    built_in += usize::from(!from_field);
-                }
+                    None if entry.text.split('=').next().is_some_and(is_name) => skip(entry, "the setting"),
+                    None => return Err(wrong("no setting")),
+                },
+                // The list may end with the number of damaged examples.
+                Kind::Example if entry.text.starts_with("spoiled=") => {}
+                Kind::Example => match (taught(&entry.text), EventLine::parse(&entry.text)) {
+                    (Some((true, _, example)), _) => field.push(example),
+                    (Some((false, _, example)), _) => built_in.push(example),
+                    (None, Some(EventLine::Newer { .. })) => skip(entry, "the event"),
+                    _ => return Err(wrong("no example")),
+                },
                 Kind::Status => {
                     let status = Status::parse(&entry.text).ok_or_else(|| wrong("no status"))?;
                     happened.push((entry, Happened::Status(status)));
                 }
-                Kind::Event => {
-                    let event = EventLine::parse(&entry.text).ok_or_else(|| wrong("no event"))?;
-                    if let EventLine::Newer { .. } = event {
-                        skip(entry, "the event");
-                        continue;
-                    }
-                    happened.push((entry, Happened::Event(event)));
-                }
+                Kind::Event => match EventLine::parse(&entry.text).ok_or_else(|| wrong("no event"))? {
+                    EventLine::Newer { .. } => skip(entry, "the event"),
+                    event => happened.push((entry, Happened::Event(event))),
+                },
                 Kind::Command => {
                     unanswered.push_back(happened.len());
-                    happened.push((entry, Happened::Command(&entry.text)));
+                    happened.push((entry, Happened::Command(link::command(&entry.text).ok())));
                 }
                 Kind::Answer => {
                     let ConsoleLine::End { error } = ConsoleLine::parse(&entry.text) else { continue };
                     if let (Some(place), Some(_)) = (unanswered.pop_front(), error) {
-                        happened[place] = (happened[place].0, Happened::Refused);
+                        happened[place].1 = Happened::Command(None);
                     }
                 }
                 Kind::Connected | Kind::Started | Kind::Lost => {}
@@ -107,7 +94,7 @@ impl<'a> Stretch<'a> {
             }
         }
         let first = happened.iter().find_map(status).cloned();
-        Ok(first.map(|first| Self { settings, examples, built_in, first, happened, notes }))
+        Ok(first.map(|first| Self { settings, built_in, field, first, happened, notes }))
     }
 
     /// The position from which the machine is replayed. If the log shows where watching began, it is that, or a little
@@ -160,8 +147,7 @@ impl<'a> Stretch<'a> {
     /// The machine's position at a typed command that changes no state: between its last position, with that time, and
     /// the next status, by the PC's clock. `start now` at work lets the tool into the row at its next swing in.
     pub(super) fn position_of_command(&self, last: (i32, u64), place: usize) -> Option<i32> {
-        if let (_, Happened::Command(line)) = self.happened[place]
-            && link::command(line).is_ok_and(|command| command.action == Action::StartNow)
+        if let (_, Happened::Command(Some(Command { action: Action::StartNow, .. }))) = self.happened[place]
             && let Some((position, true)) = self.happened[place..].iter().find_map(swing_or_status)
         {
             return Some(position);
@@ -177,14 +163,13 @@ impl<'a> Stretch<'a> {
     /// Without a swing the tool was already out: work then began as late, and ended as early, as the log allows. Or the
     /// log ends before the swing, which then came at its end.
     pub(super) fn position_of_change(&self, place: usize) -> Option<i32> {
-        let mode = match &self.happened[place].1 {
-            Happened::Event(EventLine::Alarm { position, .. }) => return Some(*position),
+        let mode = match self.happened[place].1 {
+            Happened::Event(EventLine::Alarm { position, .. }) => return Some(position),
             Happened::Event(EventLine::State { mode }) => mode,
             _ => return None,
         };
-        let is_state = |(_, happened): &&(_, _)| matches!(happened, Happened::Event(EventLine::State { .. }));
         let next_status = || {
-            let mut until_next = self.happened[place + 1..].iter().take_while(|happened| !is_state(happened));
+            let mut until_next = self.happened[place + 1..].iter().take_while(|happened| !is_change(happened));
             until_next.find_map(|happened| Some(status(happened)?.position))
         };
         let before = || self.happened[..place].iter().rev().find_map(swing_or_status).map(|(position, _)| position);
@@ -192,7 +177,7 @@ impl<'a> Stretch<'a> {
         let is_cut = || self.happened[place..].iter().filter_map(status).nth(1).is_none() && !self.was_out(place);
         match self.swing_of_change(place) {
             Some((_, position)) => Some(position),
-            None if *mode == Mode::Work || is_cut() => next_status().or_else(before),
+            None if mode == Mode::Work || is_cut() => next_status().or_else(before),
             None => before(),
         }
     }
@@ -229,10 +214,10 @@ impl<'a> Stretch<'a> {
     /// Whether an event reports the change of state by a command. It comes after the answer, with at most one earlier
     /// requested status between them. At the end of a log it may be missing.
     pub(super) fn is_reported_by_event(&self, place: usize) -> bool {
-        let Happened::Command(line) = self.happened[place].1 else { return false };
-        let brings = match link::command(line).map(|command| command.action) {
-            Ok(Action::Start | Action::StartNow) => Mode::Work,
-            Ok(Action::Hold | Action::Clear) => Mode::Hold,
+        let Happened::Command(Some(command)) = self.happened[place].1 else { return false };
+        let brings = match command.action {
+            Action::Start | Action::StartNow => Mode::Work,
+            Action::Hold | Action::Clear => Mode::Hold,
             _ => return false,
         };
         let mut statuses = 0;
@@ -249,8 +234,7 @@ impl<'a> Stretch<'a> {
 
     /// Whether a swing belongs to a change of state before it.
     pub(super) fn follows_change(&self, place: usize) -> bool {
-        let is_state = |(_, happened): &(_, _)| matches!(happened, Happened::Event(EventLine::State { .. }));
-        let change = self.happened[..place].iter().rposition(is_state);
+        let change = self.happened[..place].iter().rposition(is_change);
         change.and_then(|change| self.swing_of_change(change)).is_some_and(|(index, _)| index == place)
     }
 
@@ -260,8 +244,13 @@ impl<'a> Stretch<'a> {
     }
 }
 
+/// Whether it is a change of state.
+fn is_change((_, happened): &(&Entry, Happened)) -> bool {
+    matches!(happened, Happened::Event(EventLine::State { .. }))
+}
+
 /// The position in a swing or a status, and whether it is a swing.
-fn swing_or_status((_, happened): &(&Entry, Happened<'_>)) -> Option<(i32, bool)> {
+fn swing_or_status((_, happened): &(&Entry, Happened)) -> Option<(i32, bool)> {
     match happened {
         Happened::Event(EventLine::Swing { position, .. }) => Some((*position, true)),
         Happened::Status(status) => Some((status.position, false)),
@@ -270,6 +259,6 @@ fn swing_or_status((_, happened): &(&Entry, Happened<'_>)) -> Option<(i32, bool)
 }
 
 /// The status in a line of the log.
-fn status<'a>((_, happened): &'a (&Entry, Happened<'_>)) -> Option<&'a Status> {
+fn status<'a>((_, happened): &'a (&Entry, Happened)) -> Option<&'a Status> {
     if let Happened::Status(status) = happened { Some(status) } else { None }
 }

@@ -1,7 +1,7 @@
 //! A trial's findings, in sentences.
 
 use super::table::LEAVE_OUT;
-use super::{Analysis, Performance, PlotRecord, Response, ResponseAnalysis, Treatment, nominal};
+use super::{Analysis, PlotRecord, Response, ResponseAnalysis, Treatment, nominal};
 use crate::statistics::{OddsTerm, SIGNIFICANCE, Share, Term, grouped, probability};
 use crate::table::{distinct, in_words, list};
 use field::counted;
@@ -20,7 +20,7 @@ impl Analysis {
         findings.extend(self.more_weeds());
         findings.extend(self.speeds_as_measured());
         // Area, time, width or speed is wrong.
-        let is_hasty = |_: &PlotRecord, plot: &Performance| plot.field_efficiency_percent.is_some_and(|it| it > 100.0);
+        let is_hasty = |record: &PlotRecord| record.performance().field_efficiency_percent.is_some_and(|it| it > 100.0);
         if let Some(plots) = self.named(is_hasty) {
             findings.push(format!(
                 "{plots}: more ground was covered than speed and width allow (field efficiency above 100 %), so check area, time, width and speed."
@@ -30,18 +30,18 @@ impl Analysis {
     }
 
     /// The plots for which this is true, with their numbers: `Plots 2 and 5`.
-    fn named(&self, is_meant: impl Fn(&PlotRecord, &Performance) -> bool) -> Option<String> {
-        let plots = self.records.iter().zip(&self.performances);
-        let numbers: Vec<f64> =
-            plots.filter(|(record, plot)| is_meant(record, plot)).map(|(record, _)| f64::from(record.plot)).collect();
+    fn named(&self, is_meant: impl Fn(&PlotRecord) -> bool) -> Option<String> {
+        let meant = self.records.iter().filter(|record| is_meant(record));
+        let numbers: Vec<f64> = meant.map(|record| f64::from(record.plot)).collect();
         let of = if numbers.len() == 1 { "Plot" } else { "Plots" };
         (!numbers.is_empty()).then(|| format!("{of} {}", list(&numbers)))
     }
 
     /// The plots that take no part in a measure, and why.
     fn incomplete(&self) -> Vec<String> {
-        let reasons = grouped(self.records.iter().zip(&self.performances).filter_map(|(record, plot)| {
-            let lacks_it = |response: &Response| response.value(plot).is_none();
+        let reasons = grouped(self.records.iter().filter_map(|record| {
+            let plot = record.performance();
+            let lacks_it = |response: &Response| response.value(&plot).is_none();
             let without: Vec<String> =
                 Response::ALL.into_iter().filter(lacks_it).map(|response| response.title().to_lowercase()).collect();
             (!without.is_empty()).then(|| ((lacking(record), without), f64::from(record.plot)))
@@ -56,7 +56,7 @@ impl Analysis {
 
     /// The plots with more weeds after weeding than before.
     fn more_weeds(&self) -> Option<String> {
-        let plots = self.named(|record, _| record.has_more_weeds_after())?;
+        let plots = self.named(|record| record.weeds_before.is_some_and(|before| record.weeds_after > Some(before)))?;
         Some(format!(
             "{plots}: more weeds were counted after weeding than before. The weeding efficiency is negative there; in the binomial model no weed counts as gone. If this is a mistake, correct it; {LEAVE_OUT}."
         ))
@@ -105,11 +105,10 @@ impl Analysis {
         if count == 0 {
             return format!("None of {of} plants was damaged: {share} % ({}).", share.kind());
         }
-        let percents = self.performances.iter().map(|plot| plot.plant_damage_percent);
-        let most = percents.clone().flatten().fold(0.0, f64::max);
-        let is_worst = |percent: &Option<f64>| percent.is_some_and(|percent| percent >= most);
-        let worst = self.records.iter().zip(percents).filter(|(_, percent)| is_worst(percent));
-        let place = |(plot, _): (&PlotRecord, _)| {
+        let percent = |plot: &PlotRecord| plot.performance().plant_damage_percent;
+        let most = self.records.iter().filter_map(percent).fold(0.0, f64::max);
+        let worst = self.records.iter().filter(|plot| percent(plot).is_some_and(|percent| percent >= most));
+        let place = |plot: &PlotRecord| {
             format!("replication {}, {} km/h, {} cm", plot.replication, plot.speed_km_h, plot.spacing_cm)
         };
         let worst: Vec<String> = worst.map(place).collect();

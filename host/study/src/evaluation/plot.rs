@@ -41,26 +41,26 @@ pub struct PlotRecord {
     pub power_hp: Option<f64>,
 }
 
-/// A column of a table of plots: its name there, its heading in a report, its decimals there, and its range. `None`
-/// prints all decimals.
-type Column = (&'static str, &'static str, Option<usize>, (f64, f64));
+/// A column of a table of plots: its name there, its heading in a report, its decimals there, its range, and its value
+/// in a plot. `None` prints all decimals.
+type Column = (&'static str, &'static str, Option<usize>, (f64, f64), fn(&PlotRecord) -> Option<f64>);
 
 /// The range of a count.
 const COUNT: (f64, f64) = (0.0, f64::INFINITY);
 
 /// The columns of a table of plots, which carry their units.
 pub(crate) const COLUMNS: [Column; 11] = [
-    ("replication", "replication", None, COUNT),
-    ("speed_km_h", "speed, km/h", None, (0.1, 15.0)),
-    ("spacing_cm", "spacing, cm", None, (5.0, 500.0)),
-    ("weeds_before", "weeds before", None, COUNT),
-    ("weeds_after", "weeds after", None, COUNT),
-    ("plants", "plants", None, COUNT),
-    ("damaged", "damaged", None, COUNT),
-    ("area_m2", "area, m²", Some(2), (0.01, 1e6)),
-    ("time_s", "time, s", Some(1), (0.1, 1e6)),
-    ("width_m", "width, m", Some(2), (0.01, 50.0)),
-    ("power_hp", "power, hp", Some(2), (0.001, 1000.0)),
+    ("replication", "replication", None, COUNT, |plot| Some(plot.replication.into())),
+    ("speed_km_h", "speed, km/h", None, (0.1, 15.0), |plot| Some(plot.speed_km_h)),
+    ("spacing_cm", "spacing, cm", None, (5.0, 500.0), |plot| Some(plot.spacing_cm)),
+    ("weeds_before", "weeds before", None, COUNT, |plot| plot.weeds_before.map(f64::from)),
+    ("weeds_after", "weeds after", None, COUNT, |plot| plot.weeds_after.map(f64::from)),
+    ("plants", "plants", None, COUNT, |plot| plot.plants.map(f64::from)),
+    ("damaged", "damaged", None, COUNT, |plot| plot.damaged.map(f64::from)),
+    ("area_m2", "area, m²", Some(2), (0.01, 1e6), |plot| plot.area_m2),
+    ("time_s", "time, s", Some(1), (0.1, 1e6), |plot| plot.time_s),
+    ("width_m", "width, m", Some(2), (0.01, 50.0), |plot| plot.width_m),
+    ("power_hp", "power, hp", Some(2), (0.001, 1000.0), |plot| plot.power_hp),
 ];
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
@@ -105,26 +105,16 @@ impl PlotRecord {
         })
     }
 
-    /// The value of each of the [`COLUMNS`].
-    fn values(&self) -> [Option<f64>; COLUMNS.len()] {
-        let [before, after, plants, damaged] =
-            [self.weeds_before, self.weeds_after, self.plants, self.damaged].map(|count| count.map(f64::from));
-        let [replication, speed, spacing] = [self.replication.into(), self.speed_km_h, self.spacing_cm].map(Some);
-        let Self { area_m2, time_s, width_m, power_hp, .. } = *self;
-        [replication, speed, spacing, before, after, plants, damaged, area_m2, time_s, width_m, power_hp]
-    }
-
     /// The cells of a report.
     pub(super) fn cells(&self) -> Vec<String> {
         let shown = |decimals: Option<usize>, value| decimals.map_or_else(|| short(value), |some| fixed(value, some));
-        let cells = COLUMNS.into_iter().zip(self.values());
-        cells.map(|((_, _, decimals, _), value)| optional(value, |value| shown(decimals, value))).collect()
+        COLUMNS.map(|(_, _, decimals, _, value)| optional(value(self), |value| shown(decimals, value))).to_vec()
     }
 
     /// Each column with its value, which is empty if it is not known.
     pub(crate) fn columns(&self) -> impl Iterator<Item = (&'static str, String)> {
         let text = |value: Option<f64>| value.map(|value| value.to_string()).unwrap_or_default();
-        COLUMNS.into_iter().zip(self.values()).map(move |((column, ..), value)| (column, text(value)))
+        COLUMNS.into_iter().map(move |(column, .., value)| (column, text(value(self))))
     }
 
     /// Checks that a plot's values are possible.
@@ -132,8 +122,8 @@ impl PlotRecord {
     /// # Errors
     /// Names the first quantity that is out of its range or contradicts another.
     pub fn check(&self) -> Result<()> {
-        for ((column, heading, _, (least, greatest)), value) in COLUMNS.into_iter().zip(self.values()) {
-            if let Some(value) = value.filter(|value| !(least..=greatest).contains(value)) {
+        for (column, heading, _, (least, greatest), value) in COLUMNS {
+            if let Some(value) = value(self).filter(|value| !(least..=greatest).contains(value)) {
                 let unit = heading.split(", ").nth(1).unwrap_or_default().replace('²', "2");
                 bail!("{column} is {value}: it has to be from {least} to {greatest} {unit}");
             }
@@ -170,11 +160,6 @@ impl PlotRecord {
             field_efficiency_percent,
             performance_index: index(),
         }
-    }
-
-    /// Whether more weeds were counted after weeding than before.
-    pub fn has_more_weeds_after(&self) -> bool {
-        self.weeds_before.zip(self.weeds_after).is_some_and(|(before, after)| after > before)
     }
 
     /// Whether nothing of the plot was counted or timed. Area, width and power may be known beforehand.
@@ -250,13 +235,8 @@ impl Response {
     }
 }
 
-/// Texts of a cell that say that a count was not made.
+/// Texts of a cell that say that a count or measurement was not made.
 const NOT_COUNTED: [&str; 8] = ["", "na", "n/a", "n.a.", "-", "\u{2013}", "?", "."];
-
-/// Whether a cell says that its count or measurement was not made.
-pub(super) fn is_not_counted(cell: &str) -> bool {
-    NOT_COUNTED.contains(&cell.to_lowercase().as_str())
-}
 
 /// Parses a whole number.
 pub(super) fn whole(line: Line, column: &str) -> Result<u32, FileError> {
@@ -269,13 +249,18 @@ fn number(line: Line, column: &str) -> Result<f64, FileError> {
 }
 
 fn count(line: Line, column: &str) -> Result<Option<u32>, FileError> {
-    let right = "a whole number, 0 or more, or empty if it was not counted";
-    (!is_not_counted(line.text(column))).then(|| line.value(column, right)).transpose()
+    made(line, column, "a whole number, 0 or more, or empty if it was not counted")
 }
 
 fn measured(line: Line, column: &str) -> Result<Option<f64>, FileError> {
-    let right = "a number, like 1.5, or empty if it was not measured";
-    (!is_not_counted(line.text(column))).then(|| line.value(column, right).map(|Number(value)| value)).transpose()
+    let number = made(line, column, "a number, like 1.5, or empty if it was not measured")?;
+    Ok(number.map(|Number(value)| value))
+}
+
+/// A count or measurement, if it was made.
+fn made<T: FromStr>(line: Line, column: &str, right: &str) -> Result<Option<T>, FileError> {
+    let is_made = !NOT_COUNTED.contains(&line.text(column).to_lowercase().as_str());
+    is_made.then(|| line.value(column, right)).transpose()
 }
 
 /// A decimal number, without `inf` and `nan`.

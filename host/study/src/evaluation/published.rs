@@ -4,11 +4,9 @@
 //! with that.
 //!
 //! **Which of its figures fit Eq. 27?** The paper has a capacity of 0.041 ha/h, with some 85 % of the weeds removed and
-//! 2 % of the plants damaged, and an engine of 2.5 hp. This gives a performance index of 137, and no machine of that
-//! capacity and power could exceed 164. The printed 185 to 202 need 0.056 to 0.060 ha/h at 2.5 hp, or 1.8 to 1.7 hp at
-//! 0.041 ha/h. Eq. 24 and 25 give capacities for its width of 0.40 m and its field efficiencies. With these the index
-//! doubles from 123 at 1 km/h to 257 at 2.5 km/h, since capacity grows with speed. For 202 and 185 the power would have
-//! to grow with it, from 1.5 to 3.5 hp. So Fig. 10, where the index rises with speed, follows from Eq. 27 for one
+//! 2 % of the plants damaged, and an engine of 2.5 hp, which is an index of 137. The printed 185 to 202 need 0.056 to
+//! 0.060 ha/h at 2.5 hp, or 1.8 to 1.7 hp at 0.041 ha/h. With the capacities of Eq. 24 and 25 the power would have to
+//! grow with speed, from 1.5 to 3.5 hp. So Fig. 10, where the index rises with speed, follows from Eq. 27 for one
 //! engine. Eq. 30, where it falls, does not.
 
 use super::plot::Response;

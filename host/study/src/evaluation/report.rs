@@ -58,32 +58,26 @@ impl Display for ResponseAnalysis {
     }
 }
 
-/// The measures of a plot or of a treatment, and what stands above them.
-const MEASURES: [&str; 6] = [
-    "plant damage, %",
-    "weeding efficiency, %",
-    "theoretical capacity, ha/h",
-    "effective capacity, ha/h",
-    "field efficiency, %",
-    "performance index",
+/// A measure of a plot or of a treatment: what stands above it, its decimals, and its value.
+type Measure = (&'static str, usize, fn(&Performance) -> Option<f64>);
+
+const MEASURES: [Measure; 6] = [
+    ("plant damage, %", 2, |of| of.plant_damage_percent),
+    ("weeding efficiency, %", 2, |of| of.weeding_efficiency_percent),
+    ("theoretical capacity, ha/h", 4, |of| of.theoretical_capacity_ha_h),
+    ("effective capacity, ha/h", 4, |of| of.effective_capacity_ha_h),
+    ("field efficiency, %", 2, |of| of.field_efficiency_percent),
+    ("performance index", 2, |of| of.performance_index),
 ];
 
-fn measures(performance: &Performance) -> [String; 6] {
-    let shown = |value, decimals| optional(value, |value| fixed(value, decimals));
-    [
-        shown(performance.plant_damage_percent, 2),
-        shown(performance.weeding_efficiency_percent, 2),
-        shown(performance.theoretical_capacity_ha_h, 4),
-        shown(performance.effective_capacity_ha_h, 4),
-        shown(performance.field_efficiency_percent, 2),
-        shown(performance.performance_index, 2),
-    ]
+fn measures(of: &Performance) -> [String; MEASURES.len()] {
+    MEASURES.map(|(_, decimals, value)| optional(value(of), |value| fixed(value, decimals)))
 }
 
 impl Analysis {
     /// The means by treatment.
     pub(crate) fn means(&self) -> Table {
-        let columns = ["treatment", "plots"].into_iter().chain(MEASURES);
+        let columns = ["treatment", "plots"].into_iter().chain(MEASURES.map(|(heading, ..)| heading));
         let mut table = Table::new("Means of the plots of each treatment", columns);
         for treatment in self.treatments() {
             let name = format!("{} km/h, {} cm", short(treatment.speed_km_h), short(treatment.spacing_cm));
@@ -101,10 +95,12 @@ impl Analysis {
 
     /// Each plot: its record and its measures.
     pub(crate) fn plots(&self) -> Table {
-        let columns = ["plot"].into_iter().chain(COLUMNS.map(|(_, heading, ..)| heading)).chain(MEASURES);
+        let counted = COLUMNS.map(|(_, heading, ..)| heading);
+        let columns = ["plot"].into_iter().chain(counted).chain(MEASURES.map(|(heading, ..)| heading));
         let mut table = Table::new("Each plot: counts, measurements and results", columns);
-        for (record, performance) in self.records.iter().zip(&self.performances) {
-            table.rows.push([vec![record.plot.to_string()], record.cells(), measures(performance).into()].concat());
+        for record in &self.records {
+            let measures = measures(&record.performance());
+            table.rows.push([vec![record.plot.to_string()], record.cells(), measures.into()].concat());
         }
         table
     }
@@ -114,18 +110,9 @@ impl ResponseAnalysis {
     /// The coefficients with their errors, beside the paper's.
     pub(crate) fn terms(&self) -> Table {
         let Published { equation, text, equation_number, .. } = self.published;
-        let mut table = Table::new(
-            "Linear model",
-            [
-                "term",
-                "estimate",
-                "standard error",
-                "t",
-                "p",
-                &format!("paper, Eq. {equation_number}"),
-                "paper, in its text",
-            ],
-        );
+        let of_paper = format!("paper, Eq. {equation_number}");
+        let columns = ["term", "estimate", "standard error", "t", "p", &of_paper, "paper, in its text"];
+        let mut table = Table::new("Linear model", columns);
         let rows = [
             ("constant", "constant", equation.constant, text.constant),
             ("speed", "for each km/h", equation.per_km_h, text.per_km_h),
@@ -153,25 +140,17 @@ impl ResponseAnalysis {
         let published: Vec<String> = self.published.ranges.iter().map(range).collect();
         let share = |value| fixed(value, 4);
         let ours = |value: fn(&LinearModel) -> f64, said: fn(f64) -> String| optional(model.map(value), said);
-        let row = |what: &str, ours: String, paper: String| vec![what.to_owned(), ours, paper];
         let nothing = || NOTHING.to_owned();
-        let mut table = Table::new("Fit and range", ["", "this trial", "paper"]);
-        table.rows = vec![
-            row("R²", ours(|model| model.r_squared, share), share(self.published.r_squared)),
-            row(
-                "adjusted R²",
-                ours(|model| model.adjusted_r_squared, share),
-                optional(self.published.adjusted_r_squared, share),
-            ),
-            row("residual standard error", ours(|model| model.residual_standard_error, significant), nothing()),
-            row("degrees of freedom", ours(|model| model.degrees_of_freedom as f64, short), nothing()),
-            row(
-                &format!("range, {}", self.response.unit()),
-                self.range.as_ref().map_or_else(nothing, range),
-                published.join(",\n"),
-            ),
+        let adjusted = optional(self.published.adjusted_r_squared, share);
+        let what = format!("range, {}", self.response.unit());
+        let rows = [
+            ["R²".to_owned(), ours(|model| model.r_squared, share), share(self.published.r_squared)],
+            ["adjusted R²".to_owned(), ours(|model| model.adjusted_r_squared, share), adjusted],
+            ["residual standard error".to_owned(), ours(|model| model.residual_standard_error, significant), nothing()],
+            ["degrees of freedom".to_owned(), ours(|model| model.degrees_of_freedom as f64, short), nothing()],
+            [what, self.range.as_ref().map_or_else(nothing, range), published.join(",\n")],
         ];
-        table
+        Table { rows: rows.map(Vec::from).to_vec(), ..Table::new("Fit and range", ["", "this trial", "paper"]) }
     }
 
     /// Remarks on the models and the residuals, each sentence once.
@@ -217,13 +196,14 @@ impl BinomialModel {
                 let (least, greatest) = term.odds_interval;
                 format!("{} ({} to {})", fixed(term.odds_ratio), fixed(least), fixed(greatest))
             });
-            let cells = [
+            table.rows.push(vec![
+                name.to_owned(),
                 significant(term.estimate),
                 significant(term.standard_error),
                 fixed(term.statistic, 2),
                 probability(term.p),
-            ];
-            table.rows.push([name.to_owned()].into_iter().chain(cells).chain([times]).collect());
+                times,
+            ]);
         }
         table
     }
@@ -232,10 +212,8 @@ impl BinomialModel {
 impl AnalysisOfVariance {
     /// The part of the variation of each factor.
     pub(crate) fn table(&self) -> Table {
-        let mut table = Table::new(
-            "Analysis of variance",
-            ["source", "degrees of freedom", "sum of squares", "mean square", "F", "p"],
-        );
+        let columns = ["source", "degrees of freedom", "sum of squares", "mean square", "F", "p"];
+        let mut table = Table::new("Analysis of variance", columns);
         for source in &self.sources {
             table.rows.push(vec![
                 source.name.replace(" x ", " × "),

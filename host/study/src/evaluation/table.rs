@@ -76,47 +76,37 @@ mod tests {
         assert_eq!(read(&text), read(&format!("{HEADER}{LINE}")));
     }
 
+    /// The error for a plot with this text in a column.
+    #[track_caller]
+    fn assert_refused(column: &str, cell: &str, said: &str) {
+        let place = HEADER.trim().split(',').position(|name| name == column).unwrap();
+        let mut cells: Vec<&str> = LINE.trim().split(',').collect();
+        cells[place] = cell;
+        let error = read(&format!("# a trial\n{HEADER}{}\n", cells.join(","))).unwrap_err();
+        assert_eq!(error, format!("trial.csv, line 3: {column} is {said}"));
+    }
+
     #[test]
     fn each_wrong_value_is_named_by_file_line_and_column() {
-        for (wrong, said) in [
-            ("1,fast,50,200,30,50,1,24,180,0.4,2.5", "speed_km_h is `fast`: it has to be a number, like 1.5"),
-            ("1,nan,50,200,30,50,1,24,180,0.4,2.5", "speed_km_h is `nan`: it has to be a number, like 1.5"),
-            ("1,,50,200,30,50,1,24,180,0.4,2.5", "speed_km_h is ``: it has to be a number, like 1.5"),
-            (
-                "1,0.05,50,200,30,50,1,24,180,0.4,2.5",
-                "speed_km_h is 0.05: it has to be from 0.1 to 15 km/h; to leave a plot out, put # in front of its line",
-            ),
-            (
-                "1,1.5,0.5,200,30,50,1,24,180,0.4,2.5",
-                "spacing_cm is 0.5: it has to be from 5 to 500 cm; to leave a plot out, put # in front of its line",
-            ),
-            (
-                "1,1.5,50,-2,30,50,1,24,180,0.4,2.5",
-                "weeds_before is `-2`: it has to be a whole number, 0 or more, or empty if it was not counted",
-            ),
-            ("1,1.5,50,,,,,24,,0.4,2.5", "1 of 1 plots are not filled in: enter what was counted"),
-            (
-                "1,1.5,50,200,30,50,51,24,180,0.4,2.5",
-                "damaged is 51: it cannot exceed plants; to leave a plot out, put # in front of its line",
-            ),
-            (
-                "1,1.5,50,200,30,50,1,0,180,0.4,2.5",
-                "area_m2 is 0: it has to be from 0.01 to 1000000 m2; to leave a plot out, put # in front of its line",
-            ),
-            (
-                "1,1.5,50,200,30,50,1,24,0,0.4,2.5",
-                "time_s is 0: it has to be from 0.1 to 1000000 s; to leave a plot out, put # in front of its line",
-            ),
-            (
-                "1,1.5,50,200,30,50,1,24,180,0,2.5",
-                "width_m is 0: it has to be from 0.01 to 50 m; to leave a plot out, put # in front of its line",
-            ),
-            (
-                "1,1.5,50,200,30,50,1,24,180,0.4,-1",
-                "power_hp is -1: it has to be from 0.001 to 1000 hp; to leave a plot out, put # in front of its line",
-            ),
-        ] {
-            assert_eq!(read(&format!("# a trial\n{HEADER}{wrong}\n")), Err(format!("trial.csv, line 3: {said}")));
+        for cell in ["fast", "nan", ""] {
+            assert_refused("speed_km_h", cell, &format!("`{cell}`: it has to be a number, like 1.5"));
         }
+        let said = "`-2`: it has to be a whole number, 0 or more, or empty if it was not counted";
+        assert_refused("weeds_before", "-2", said);
+        for (column, cell, right) in [
+            ("speed_km_h", "0.05", "it has to be from 0.1 to 15 km/h"),
+            ("spacing_cm", "0.5", "it has to be from 5 to 500 cm"),
+            ("damaged", "51", "it cannot exceed plants"),
+            ("area_m2", "0", "it has to be from 0.01 to 1000000 m2"),
+            ("time_s", "0", "it has to be from 0.1 to 1000000 s"),
+            ("width_m", "0", "it has to be from 0.01 to 50 m"),
+            ("power_hp", "-1", "it has to be from 0.001 to 1000 hp"),
+        ] {
+            let how = "to leave a plot out, put # in front of its line";
+            assert_refused(column, cell, &format!("{cell}: {right}; {how}"));
+        }
+        let blank = read(&format!("# a trial\n{HEADER}1,1.5,50,,,,,24,,0.4,2.5\n"));
+        let said = "trial.csv, line 3: 1 of 1 plots are not filled in: enter what was counted";
+        assert_eq!(blank, Err(said.to_owned()));
     }
 }

@@ -10,8 +10,26 @@ fn experiment(speeds_km_h: &[f64], preset: &str) -> Experiment {
     Experiment { speeds_km_h: speeds_km_h.to_vec(), replications: 1, ..Experiment::as_in_the_paper(conditions, 1) }
 }
 
+impl Experiment {
+    /// The same with these parameters and settings.
+    fn with(mut self, changes: &[(&str, f64)]) -> Self {
+        changes.iter().for_each(|&(name, value)| self.conditions.set(name, value).unwrap());
+        self
+    }
+
+    /// The same by the firmware alone.
+    fn of_firmware(self) -> Self {
+        Self { controllers: vec![Treatment::Firmware], ..self }
+    }
+}
+
 fn run(experiment: &Experiment) -> Vec<PlotOutcome> {
     experiment.run(&Engine::Native, |_| ()).unwrap()
+}
+
+/// The totals of all plots, with the firmware's at the lowest speed first.
+fn all(experiment: &Experiment) -> Vec<Total> {
+    totals(&run(experiment))
 }
 
 #[test]
@@ -27,17 +45,15 @@ fn the_result_does_not_depend_on_the_number_of_threads() {
 #[test]
 fn a_controller_gets_the_same_field_with_and_without_others() {
     let all = experiment(&[1.5], "transplanted");
-    let alone = Experiment { controllers: vec![Treatment::Firmware], ..all.clone() };
-    assert_eq!(records(&run(&all), Treatment::Firmware), records(&run(&alone), Treatment::Firmware));
+    assert_eq!(records(&run(&all), Treatment::Firmware), records(&run(&all.of_firmware()), Treatment::Firmware));
 }
 
 #[test]
 fn the_firmware_damages_no_plant_and_weeds_up_to_the_bound_where_the_papers_damages_more_the_faster_it_goes() {
     for seed in 1..=3 {
-        let mut experiment = Experiment { seed, ..experiment(&[1.0, 1.5, 2.0, 2.5, 3.0, 3.5], "transplanted") };
+        let experiment = Experiment { seed, ..experiment(&[1.0, 1.5, 2.0, 2.5, 3.0, 3.5], "transplanted") };
         // A mean swing's: the margin and the slip, which has the tool swing early, cover the slowest.
-        experiment.conditions.set("lead_out_ms", 180.0).unwrap();
-        let totals = totals(&run(&experiment));
+        let totals = all(&experiment.with(&[("lead_out_ms", 180.0)]));
         let of = |controller| totals.iter().filter(move |total| total.plots.controller == controller);
         for total in of(Treatment::Firmware) {
             assert_eq!(
@@ -60,7 +76,7 @@ fn the_firmware_damages_no_plant_and_weeds_up_to_the_bound_where_the_papers_dama
 fn the_ideal_controller_damages_no_plant_in_any_field_and_weeds_more_than_the_firmware() {
     // Without look-ahead, the firmware weeds more, but damages plants.
     for preset in presets().filter(|preset| *preset != "paper") {
-        let totals = totals(&run(&experiment(&[1.0, 2.5], preset)));
+        let totals = all(&experiment(&[1.0, 2.5], preset));
         for pair in totals.chunks(Treatment::ALL.len()) {
             let (firmware, ideal) = (pair[0].plots, pair[3].plots);
             assert_eq!((firmware.controller, ideal.controller), (Treatment::Firmware, Treatment::Ideal));
@@ -76,9 +92,8 @@ fn in_every_row_of_every_preset_the_loss_budget_adds_up_and_who_damages_no_plant
         for seed in 1..=3 {
             // One row a plot: an average would hide a row, and a plot with one damaged plant may weed more than its
             // bound.
-            let mut experiment = Experiment { seed, ..experiment(&[1.0, 2.5, 6.0], preset) };
-            experiment.conditions.set("plot.rows", 1.0).unwrap();
-            for outcome in run(&experiment) {
+            let experiment = Experiment { seed, ..experiment(&[1.0, 2.5, 6.0], preset) };
+            for outcome in run(&experiment.with(&[("plot.rows", 1.0)])) {
                 let PlotOutcome { controller, budget, weeded_share, undamaged_share, effect, .. } = outcome;
                 let within = weeded_share <= undamaged_share + 1e-3;
                 assert!(effect.damaged > 0 || within, "{preset}, {controller:?}: {weeded_share} of {undamaged_share}");
@@ -96,13 +111,10 @@ fn in_every_row_of_every_preset_the_loss_budget_adds_up_and_who_damages_no_plant
 fn the_loss_budget_agrees_with_a_hand_calculation() {
     // Whole canopies of 150 mm, or of each the stem zone of 120 mm.
     for (stem_zone_mm, kept_mm) in [(0.0, 150.0), (120.0, 120.0)] {
-        let mut experiment = experiment(&[2.5], "even-stand");
-        experiment.spacings_cm = vec![50.0];
+        let experiment = Experiment { spacings_cm: vec![50.0], ..experiment(&[2.5], "even-stand") };
         // So short a lead that the tool comes in between two plants.
-        for (setting, value) in [("lead_out_ms", 180.0), ("stem_zone_mm", stem_zone_mm)] {
-            experiment.conditions.set(setting, value).unwrap();
-        }
-        let budget = totals(&run(&experiment))[0].plots.budget;
+        let settings = [("lead_out_ms", 180.0), ("stem_zone_mm", stem_zone_mm)];
+        let budget = all(&experiment.with(&settings))[0].plots.budget;
         // A margin of 50 mm on both sides, a plant every 500 mm, 694.4 mm/s.
         let mm_s = 2.5e6 / 3600.0;
         // Out: the command leads by 181 ms. Before the tool loses ground, 2 ms of pulse, 65 ms of dead time and 12 ms
@@ -127,9 +139,8 @@ fn the_loss_budget_agrees_with_a_hand_calculation() {
 #[test]
 fn each_part_of_the_loss_budget_has_its_expected_ground() {
     let budget = |preset: &str, speed_km_h: f64, changes: &[(&str, f64)]| {
-        let mut experiment = Experiment { spacings_cm: vec![50.0], ..experiment(&[speed_km_h], preset) };
-        changes.iter().for_each(|&(name, value)| experiment.conditions.set(name, value).unwrap());
-        totals(&run(&experiment))[0].plots.budget
+        let experiment = Experiment { spacings_cm: vec![50.0], ..experiment(&[speed_km_h], preset) };
+        all(&experiment.with(changes))[0].plots.budget
     };
     // Weeds as wide as plants get a zone; dust and narrow weeds do not.
     let (even, weedy) = (budget("even-stand", 1.0, &[]), budget("weedy", 1.0, &[]));
@@ -152,9 +163,7 @@ fn each_part_of_the_loss_budget_has_its_expected_ground() {
 
 #[test]
 fn a_quick_tool_damages_no_plant_up_to_7_km_h() {
-    let mut experiment = experiment(&[0.36, 1.0, 2.5, 4.0, 6.0, 7.0], "quick-tool");
-    experiment.controllers = vec![Treatment::Firmware];
-    for total in totals(&run(&experiment)) {
+    for total in all(&experiment(&[0.36, 1.0, 2.5, 4.0, 6.0, 7.0], "quick-tool").of_firmware()) {
         assert_eq!((total.plots.effect.injured(), total.plots.alarms), (0, 0), "{total:?}");
         assert!(total.plots.weeded_share > 0.42, "{total:?}");
     }
@@ -162,12 +171,8 @@ fn a_quick_tool_damages_no_plant_up_to_7_km_h() {
 
 #[test]
 fn a_machine_that_starts_again_every_two_metres_has_its_tool_out_in_time() {
-    let mut experiment = Experiment { replications: 20, ..experiment(&[2.5, 4.0], "straight") };
-    experiment.controllers = vec![Treatment::Firmware];
-    for (parameter, value) in [("driving.stops_per_100_m", 50.0), ("driving.stop_s", 1.0)] {
-        experiment.conditions.set(parameter, value).unwrap();
-    }
-    for total in totals(&run(&experiment)) {
+    let experiment = Experiment { replications: 20, ..experiment(&[2.5, 4.0], "straight") }.of_firmware();
+    for total in all(&experiment.with(&[("driving.stops_per_100_m", 50.0), ("driving.stop_s", 1.0)])) {
         // With leads for the measured speed, one zone in 110 would be reached: a machine that accelerates is faster.
         assert!(total.plots.zones.reached * 200 < total.plots.zones.all, "{total:?}");
         // A stem may stand off the middle of its zone: some seeds have one such plant in 4,000, most have none.
@@ -177,11 +182,8 @@ fn a_machine_that_starts_again_every_two_metres_has_its_tool_out_in_time() {
 
 #[test]
 fn a_machine_steered_by_hand_spares_its_plants_once_it_is_set_up_for_that() {
-    let total = |preset: &str| {
-        let experiment = Experiment { replications: 3, ..experiment(&[1.0], preset) };
-        totals(&run(&experiment))[0]
-    };
-    let (from_the_box, set_up) = (total("hand-steered").plots.effect, total("walked").plots.effect);
+    let [from_the_box, set_up] = ["hand-steered", "walked"]
+        .map(|preset| all(&Experiment { replications: 3, ..experiment(&[1.0], preset) })[0].plots.effect);
     let percent = |damaged: u32| 100.0 * f64::from(damaged) / f64::from(from_the_box.plants);
     assert!(percent(from_the_box.damaged) > 1.0 && percent(from_the_box.swept) > 5.0, "{from_the_box:?}");
     assert!(from_the_box.unseen > 0 && from_the_box.unseen <= from_the_box.damaged, "{from_the_box:?}");
@@ -190,10 +192,8 @@ fn a_machine_steered_by_hand_spares_its_plants_once_it_is_set_up_for_that() {
 
 /// How many plants the machine damages on `walked` at 4 km/h of those that a beam sees, and these, with these changes.
 fn damaged_of_seen(changes: &[(&str, f64)], replications: u32) -> (u32, u32) {
-    let mut experiment = Experiment { replications, ..experiment(&[4.0], "walked") };
-    experiment.controllers = vec![Treatment::Firmware];
-    changes.iter().for_each(|&(name, value)| experiment.conditions.set(name, value).unwrap());
-    totals(&run(&experiment))[0].plots.effect.injured_of_seen()
+    let experiment = Experiment { replications, ..experiment(&[4.0], "walked") };
+    all(&experiment.of_firmware().with(changes))[0].plots.effect.injured_of_seen()
 }
 
 #[test]
@@ -218,12 +218,9 @@ fn sway_side_play_and_straying_damage_plants_once_they_are_larger_than_the_machi
 
 #[test]
 fn the_guard_spares_most_of_the_plants_that_the_beam_does_not_see() {
-    let mut experiment = Experiment { spacings_cm: vec![50.0], replications: 10, ..experiment(&[1.0, 4.0], "walked") };
-    experiment.controllers = vec![Treatment::Firmware];
-    for (name, value) in [("sensors.unseen_percent", 2.0), ("guard_spacing_mm", 500.0), ("guard_scatter_mm", 40.0)] {
-        experiment.conditions.set(name, value).unwrap();
-    }
-    for total in totals(&run(&experiment)) {
+    let experiment = Experiment { spacings_cm: vec![50.0], replications: 10, ..experiment(&[1.0, 4.0], "walked") };
+    let guard = [("sensors.unseen_percent", 2.0), ("guard_spacing_mm", 500.0), ("guard_scatter_mm", 40.0)];
+    for total in all(&experiment.of_firmware().with(&guard)) {
         let Effect { unseen, all_unseen, .. } = total.plots.effect;
         assert!(all_unseen > 10 && 2 * unseen < all_unseen, "{unseen} of {all_unseen}");
     }
@@ -231,8 +228,7 @@ fn the_guard_spares_most_of_the_plants_that_the_beam_does_not_see() {
 
 #[test]
 fn the_elf_weeds_as_much_of_the_default_field_as_its_native_run() {
-    let mut experiment = Experiment { replications: 2, ..experiment(&[2.5], field::conditions::DEFAULT) };
-    experiment.controllers = vec![Treatment::Firmware];
+    let experiment = Experiment { replications: 2, ..experiment(&[2.5], field::conditions::DEFAULT) }.of_firmware();
     let elf = Engine::Uno(uno_run::firmware::build().expect("the firmware builds"));
     let [native, elf] = [Engine::Native, elf].map(|engine| totals(&experiment.run(&engine, |_| ()).unwrap())[0].plots);
     assert!((native.weeded_share - elf.weeded_share).abs() < 0.003, "{} {}", native.weeded_share, elf.weeded_share);
@@ -241,18 +237,14 @@ fn the_elf_weeds_as_much_of_the_default_field_as_its_native_run() {
 
 #[test]
 fn a_configured_shorter_stroke_weeds_more_and_reaches_no_canopy() {
-    let mut shorter = experiment(&[2.5], "transplanted");
-    let paper = totals(&run(&shorter))[0].plots;
-    for (setting, value) in [("servo_out_us", 1750.0), ("lead_out_ms", 150.0)] {
-        shorter.conditions.set(setting, value).unwrap();
-    }
-    let shorter = totals(&run(&shorter))[0].plots;
+    let plots = |speed_km_h: f64, settings: &[(&str, f64)]| {
+        all(&experiment(&[speed_km_h], "transplanted").with(settings))[0].plots
+    };
+    let (paper, shorter) = (plots(2.5, &[]), plots(2.5, &[("servo_out_us", 1750.0), ("lead_out_ms", 150.0)]));
     assert_eq!((shorter.effect.damaged, shorter.zones.reached), (0, 0), "{shorter:?}");
     assert!(shorter.weeded_share > paper.weeded_share + 0.05, "{shorter:?}, {paper:?}");
     // The stroke is too short for the canopies, and the result says so.
-    let mut stub = experiment(&[1.0], "transplanted");
-    stub.conditions.set("servo_out_us", 1620.0).unwrap();
-    let stub = totals(&run(&stub))[0].plots;
+    let stub = plots(1.0, &[("servo_out_us", 1620.0)]);
     assert!(stub.zones.reached > stub.zones.all / 2, "{stub:?}");
 }
 
@@ -279,11 +271,9 @@ fn no_parameter_at_an_end_of_its_range_upsets_a_trial() {
                 let _ = experiment.conditions.set(name, value);
             }
             match experiment.run(&Engine::Native, |_| ()) {
-                Ok(outcomes) => assert!(
-                    outcomes
-                        .iter()
-                        .all(|outcome| { outcome.record.check().is_ok() && outcome.weeded_share.is_finite() })
-                ),
+                Ok(outcomes) => {
+                    assert!(outcomes.iter().all(|of| of.record.check().is_ok() && of.weeded_share.is_finite()))
+                }
                 Err(error) => {
                     let place = format!("{} = {end}", parameter.name);
                     let told = ["the beam would see nothing in a row of", "grow together to more than"];

@@ -62,12 +62,21 @@ impl Look {
 
 /// Points with one look.
 pub struct Series {
+    /// Its name in the legend.
+    pub name: String,
     /// Their look.
     pub look: Look,
     /// Joined by a line, with large markers.
     pub line: Vec<(f64, f64)>,
     /// Small pale markers of their own.
     pub cloud: Vec<(f64, f64)>,
+}
+
+impl Series {
+    /// A series without points.
+    pub fn of(name: &str, look: Look) -> Self {
+        Self { name: name.to_owned(), look, line: Vec::new(), cloud: Vec::new() }
+    }
 }
 
 /// A chart: its content, and the visible range.
@@ -79,9 +88,9 @@ pub struct Chart<'a> {
     /// The range of the y axis.
     pub y: Range<f64>,
     /// The series, the last one on top.
-    pub series: &'a [Series],
-    /// A limit, shaded from the line upwards. Empty if there is none.
-    pub limit: &'a [(f64, f64)],
+    pub series: Vec<&'a Series>,
+    /// A limit, shaded from the line upwards.
+    pub limit: Option<&'a Series>,
 }
 
 impl Chart<'_> {
@@ -114,12 +123,11 @@ impl Chart<'_> {
                 .axis_desc_style(words)
                 .set_all_tick_mark_size(10)
                 .draw()?;
-            if !self.limit.is_empty() {
-                let limit = || self.limit.iter().copied();
-                chart.draw_series(AreaSeries::new(limit(), self.y.end, LIMIT.mix(0.12)))?;
-                chart.draw_series(LineSeries::new(limit(), Look::LIMIT.stroke()))?;
+            if let Some(Series { line, look, .. }) = self.limit {
+                chart.draw_series(AreaSeries::new(line.iter().copied(), self.y.end, LIMIT.mix(0.12)))?;
+                chart.draw_series(LineSeries::new(line.iter().copied(), look.stroke()))?;
             }
-            for series in self.series {
+            for series in &self.series {
                 let colour = series.look.colour;
                 chart.draw_series(LineSeries::new(series.line.iter().copied(), series.look.stroke()))?;
                 if let Some(marker) = series.look.marker {

@@ -13,55 +13,43 @@ pub struct Figure {
     pub unit: String,
     /// The chart.
     pub svg: String,
-    /// The legend of lines and markers.
-    pub legend: Vec<Key>,
+    /// The mark and the name of each series.
+    pub legend: Vec<(String, String)>,
     /// The chart in words.
     pub words: String,
     /// The caption.
     pub caption: String,
 }
 
-/// One entry of a legend.
-pub struct Key {
-    /// Line and marker.
-    pub svg: String,
-    /// Their series.
-    pub meaning: String,
+impl Figure {
+    /// A chart whose legend has these series.
+    fn of<'a>(
+        [title, unit, caption]: [&str; 3],
+        words: String,
+        chart: &Chart,
+        legend: impl IntoIterator<Item = &'a Series>,
+    ) -> Result<Self> {
+        let entry = |series: &Series| Ok((key(series.look, !series.line.is_empty())?, series.name.clone()));
+        let legend = legend.into_iter().map(entry).collect::<Result<_>>()?;
+        Ok(Self { title: title.into(), unit: unit.into(), svg: chart.svg()?, legend, words, caption: caption.into() })
+    }
 }
 
 const SPEED: &str = "speed, km/h";
 
-/// Values over speed in km/h, with growing speed.
-pub struct Curve {
-    /// Its name in the legend.
-    pub name: String,
-    /// Speeds and values.
-    pub points: Vec<(f64, f64)>,
-}
-
 /// A measure of several controllers against speed, and its upper limit if it has one.
-pub fn curves([title, unit, caption]: [&str; 3], curves: &[Curve], limit: Option<&Curve>) -> Result<Figure> {
-    let mut series = Vec::new();
-    let mut legend = Vec::new();
-    let mut words = format!("{title} in {unit} against speed.");
-    let looks = (0..curves.len()).map(Look::of_series);
-    for (look, Curve { name, points }) in looks.chain([Look::LIMIT]).zip(curves.iter().chain(limit)) {
-        words += &said(name, points);
-        legend.push(Key { svg: key(look, true)?, meaning: name.clone() });
-        series.push(Series { look, line: points.clone(), cloud: Vec::new() });
-    }
-    // The first series is drawn last: it stays visible where lines meet. The chart draws the limit itself.
-    series.truncate(curves.len());
-    series.reverse();
-    let points = || curves.iter().chain(limit).flat_map(|curve| &curve.points);
+pub fn curves(texts: [&str; 3], curves: &[Series], limit: Option<&Series>) -> Result<Figure> {
+    let all = || curves.iter().chain(limit);
+    let points = || all().flat_map(|curve| &curve.line);
     let chart = Chart {
         x_label: SPEED,
         x: range_of(points().map(|point| point.0), false),
         y: range_of(points().map(|point| point.1), true),
-        series: &series,
-        limit: limit.map_or(&[], |limit| &limit.points),
+        // The first series is drawn last: it stays visible where lines meet.
+        series: curves.iter().rev().collect(),
+        limit,
     };
-    Ok(Figure { title: title.into(), unit: unit.into(), svg: chart.svg()?, legend, words, caption: caption.into() })
+    Figure::of(texts, against_speed(texts[0], texts[1], all().map(said)), &chart, all())
 }
 
 /// One measure of a trial against speed, a line a spacing through the means, with the plots around them.
@@ -72,73 +60,60 @@ pub fn response(analysis: &Analysis, response: Response) -> Result<Figure> {
     // An offset, so that equal values of different spacings stay visible.
     let step = (x.end - x.start) * 0.02;
     let aside = |index: usize| (index as f64 - (spacings.len() - 1) as f64 / 2.0) * step;
-    let mut series = Vec::new();
-    let mut legend = Vec::new();
-    let mut words = format!("{} in {} against speed.", response.title(), response.unit());
-    for (index, &spacing_cm) in spacings.iter().enumerate() {
-        let look = Look::of_series(index);
+    let of_spacing = |(index, &spacing_cm): (usize, &f64)| {
         let moved = |(speed_km_h, value): (f64, f64)| (speed_km_h + aside(index), value);
-        let of_spacing = treatments.iter().filter(|treatment| treatment.spacing_cm == spacing_cm);
-        let line: Vec<_> =
-            of_spacing.filter_map(|treatment| Some((treatment.speed_km_h, response.value(&treatment.mean)?))).collect();
-        let plots = analysis.records.iter().zip(&analysis.performances);
-        let cloud = plots
-            .filter(|(record, _)| record.spacing_cm == spacing_cm)
-            .filter_map(|(record, performance)| Some(moved((record.speed_km_h, response.value(performance)?))))
-            .collect();
-        let meaning = spacing(spacing_cm);
-        words += &said(&meaning, &line);
-        legend.push(Key { svg: key(look, true)?, meaning });
-        series.push(Series { look, line: line.into_iter().map(moved).collect(), cloud });
-    }
-    let points = || series.iter().flat_map(|series| &series.cloud);
-    let chart = Chart {
-        x_label: SPEED,
-        x,
-        y: range_of(points().map(|point| point.1), response == Response::PlantDamage),
-        series: &series,
-        limit: &[],
+        let treatments = treatments.iter().filter(|treatment| treatment.spacing_cm == spacing_cm);
+        let means = treatments.filter_map(|of| Some((of.speed_km_h, response.value(&of.mean)?)));
+        let plots = analysis.records.iter().filter(|record| record.spacing_cm == spacing_cm);
+        let cloud = plots.filter_map(|plot| Some(moved((plot.speed_km_h, response.value(&plot.performance())?))));
+        let means = Series { line: means.collect(), cloud: cloud.collect(), ..Series::of_spacing(index, spacing_cm) };
+        let words = said(&means);
+        (words, Series { line: means.line.into_iter().map(moved).collect(), ..means })
     };
-    Ok(Figure {
-        title: response.title().into(),
-        unit: response.unit().into(),
-        svg: chart.svg()?,
-        legend,
-        words,
-        // Its figures 8 to 11 have the measures in their order.
-        caption: format!("The paper's Fig. {}.", 8 + response as usize),
-    })
+    let (words, series): (Vec<String>, Vec<Series>) = spacings.iter().enumerate().map(of_spacing).unzip();
+    let values = series.iter().flat_map(|series| &series.cloud).map(|point| point.1);
+    let y = range_of(values, response == Response::PlantDamage);
+    let chart = Chart { x_label: SPEED, x, y, series: series.iter().collect(), limit: None };
+    let (title, unit) = (response.title(), response.unit());
+    // Its figures 8 to 11 have the measures in their order.
+    let caption = format!("The paper's Fig. {}.", 8 + response as usize);
+    Figure::of([title, unit, &caption], against_speed(title, unit, words), &chart, &series)
 }
 
 /// A model's residuals against its fitted values; `None` without a model.
 pub fn residuals(analysis: &Analysis, of: &ResponseAnalysis) -> Result<Option<Figure>> {
     let Ok(model) = &of.model else { return Ok(None) };
     let x = range_of(model.fitted.iter().copied(), false);
-    let mut series = vec![Series { look: Look::LIMIT, line: vec![(x.start, 0.0), (x.end, 0.0)], cloud: Vec::new() }];
-    let mut legend = Vec::new();
-    for (index, spacing_cm) in spacings_cm(analysis).into_iter().enumerate() {
-        let look = Look::of_series(index);
+    let zero = Series { line: vec![(x.start, 0.0), (x.end, 0.0)], ..Series::of("", Look::LIMIT) };
+    let of_spacing = |(index, spacing_cm): (usize, f64)| {
         let points = model.fitted.iter().copied().zip(model.residuals.iter().copied());
         let of_spacing = points.zip(&of.plots).filter(|(_, plot)| analysis.records[**plot].spacing_cm == spacing_cm);
-        legend.push(Key { svg: key(look, false)?, meaning: spacing(spacing_cm) });
-        series.push(Series { look, line: Vec::new(), cloud: of_spacing.map(|(point, _)| point).collect() });
-    }
+        Series { cloud: of_spacing.map(|(point, _)| point).collect(), ..Series::of_spacing(index, spacing_cm) }
+    };
+    let series: Vec<Series> = spacings_cm(analysis).into_iter().enumerate().map(of_spacing).collect();
     let farthest = model.residuals.iter().fold(0.0, |farthest: f64, residual| farthest.max(residual.abs()));
     let unit = of.response.unit();
-    let label = format!("by the model, {unit}");
-    let chart = Chart { x_label: &label, x, y: range_of([-farthest, farthest], false), series: &series, limit: &[] };
-    Ok(Some(Figure {
-        title: "Residuals".into(),
-        unit: unit.into(),
-        svg: chart.svg()?,
-        legend,
-        words: format!(
-            "Residuals of the {} plots against the model's values; the largest is {} {unit}.",
-            model.residuals.len(),
-            fixed(farthest, 2),
-        ),
-        caption: "The residual of each plot. A curve or a funnel shows that a straight line is wrong.".into(),
-    }))
+    let chart = Chart {
+        x_label: &format!("by the model, {unit}"),
+        x,
+        y: range_of([-farthest, farthest], false),
+        series: [&zero].into_iter().chain(&series).collect(),
+        limit: None,
+    };
+    let words = format!(
+        "Residuals of the {} plots against the model's values; the largest is {} {unit}.",
+        model.residuals.len(),
+        fixed(farthest, 2),
+    );
+    let caption = "The residual of each plot. A curve or a funnel shows that a straight line is wrong.";
+    Figure::of(["Residuals", unit, caption], words, &chart, &series).map(Some)
+}
+
+impl Series {
+    /// The series of a plant spacing, without points.
+    fn of_spacing(index: usize, spacing_cm: f64) -> Self {
+        Self::of(&format!("{} cm plant spacing", short(spacing_cm)), Look::of_series(index))
+    }
 }
 
 /// The spacings of a trial, narrow first.
@@ -146,12 +121,13 @@ fn spacings_cm(analysis: &Analysis) -> Vec<f64> {
     distinct(analysis.records.iter().map(|record| record.spacing_cm))
 }
 
-fn spacing(spacing_cm: f64) -> String {
-    format!("{} cm plant spacing", short(spacing_cm))
+/// A chart of lines in words.
+fn against_speed(title: &str, unit: &str, lines: impl IntoIterator<Item = String>) -> String {
+    format!("{title} in {unit} against speed.{}", lines.into_iter().collect::<String>())
 }
 
 /// A line in words.
-fn said(name: &str, line: &[(f64, f64)]) -> String {
+fn said(Series { name, line, .. }: &Series) -> String {
     let points: Vec<String> = line.iter().map(|(x, y)| format!("{} at {} km/h", fixed(*y, 1), short(*x))).collect();
     format!(" {name}: {}.", points.join(", "))
 }

@@ -130,15 +130,13 @@ fn a_file_that_is_no_part_says_so() {
 fn an_outcome_that_is_missing_doubled_or_too_many_is_named_with_its_line() {
     let text = String::from_utf8(written(&header("1/2", 5), |_| 0.5)).unwrap();
     let lines: Vec<&str> = text.lines().collect();
-    let said = |lines: &[&str]| read("p", lines.join("\n").as_bytes()).unwrap_err().to_string();
-    assert_eq!(said(&lines[..3]), "p, line 4: the part ends before number 4; compute part 1/2 again, with --force");
-    let doubled = said(&[lines[0], lines[1], lines[1], lines[3]]);
-    assert_eq!(doubled, "p, line 3: this is number 0, but has to be 2; compute part 1/2 again, with --force");
-    let too_many = said(&[&lines[..], &lines[1..2]].concat());
-    let cut = said(&[lines[0], &lines[1][..lines[1].len() / 2]]);
-    assert_eq!(
-        cut,
-        "p, line 2: this is not an outcome of this study, or was cut; compute part 1/2 again, with --force"
-    );
-    assert_eq!(too_many, "p, line 5: this is one more than the part has; compute part 1/2 again, with --force");
+    for (lines, problem) in [
+        (lines[..3].to_vec(), "line 4: the part ends before number 4"),
+        (vec![lines[0], lines[1], lines[1], lines[3]], "line 3: this is number 0, but has to be 2"),
+        ([&lines[..], &lines[1..2]].concat(), "line 5: this is one more than the part has"),
+        (vec![lines[0], &lines[1][..9]], "line 2: this is not an outcome of this study, or was cut"),
+    ] {
+        let said = read("p", lines.join("\n").as_bytes()).unwrap_err().to_string();
+        assert_eq!(said, format!("p, {problem}; compute part 1/2 again, with --force"));
+    }
 }

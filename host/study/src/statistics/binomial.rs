@@ -66,13 +66,6 @@ pub struct BinomialModel {
     pub remarks: Vec<Remark>,
 }
 
-/// A fit that has converged.
-struct Fit {
-    solution: Solution,
-    fitted: Vec<f64>,
-    deviance: f64,
-}
-
 impl BinomialModel {
     /// Fits the model to a plot's count, and to how many it is of.
     ///
@@ -90,7 +83,7 @@ impl BinomialModel {
             return Err(NoModel::Constant { value: if all == 0.0 { 0.0 } else { 100.0 } });
         }
         let (columns, mut remarks) = design.columns()?;
-        let Fit { solution, fitted, deviance: unexplained } = fit(&columns, &counts)?;
+        let (solution, fitted) = fit(&columns, &counts)?;
         let share = all / of;
         let degrees_of_freedom = counts.len() - columns.len();
         let dispersion = pearson(&counts, &fitted) / degrees_of_freedom as f64;
@@ -100,11 +93,9 @@ impl BinomialModel {
             remarks.push(Remark::Overdispersed { factor });
         }
         let student = StudentsT::new(0.0, 1.0, degrees_of_freedom as f64).ok().filter(|_| is_quasi);
-        let beyond =
-            |statistic| student.map_or_else(|| Normal::standard().sf(statistic), |student| student.sf(statistic));
-        let upper = 1.0 - (1.0 - CONFIDENCE) / 2.0;
-        let quantile =
-            student.map_or_else(|| Normal::standard().inverse_cdf(upper), |student| student.inverse_cdf(upper));
+        let normal = Normal::standard();
+        let chance: &dyn ContinuousCDF<f64, f64> = student.as_ref().map_or(&normal, |student| student);
+        let quantile = chance.inverse_cdf(1.0 - (1.0 - CONFIDENCE) / 2.0);
         let term = |(index, (name, _)): (usize, &Column)| {
             let (estimate, standard_error) = (solution.coefficients[index], factor * solution.variances[index].sqrt());
             let statistic = estimate / standard_error;
@@ -114,14 +105,14 @@ impl BinomialModel {
                 estimate,
                 standard_error,
                 statistic,
-                p: 2.0 * beyond(statistic.abs()),
+                p: 2.0 * chance.sf(statistic.abs()),
                 odds_ratio: odds(0.0),
                 odds_interval: (odds(-quantile), odds(quantile)),
             }
         };
         Ok(Self {
             terms: columns.iter().enumerate().map(term).collect(),
-            deviance: unexplained,
+            deviance: deviance(&counts, &fitted),
             null_deviance: deviance(&counts, &vec![share; counts.len()]),
             degrees_of_freedom,
             dispersion,
@@ -143,8 +134,8 @@ const OVERDISPERSED: f64 = 1.5;
 /// A plot's count, and how many it is of.
 type Count = (f64, f64);
 
-/// Iteratively reweighted least squares.
-fn fit(columns: &[Column], counts: &[Count]) -> Result<Fit, NoModel> {
+/// The coefficients and each plot's share, by iteratively reweighted least squares.
+fn fit(columns: &[Column], counts: &[Count]) -> Result<(Solution, Vec<f64>), NoModel> {
     // R starts half a count inside, so that no plot is at 0 or 1.
     let mut fitted: Vec<f64> = counts.iter().map(|(count, of)| (count + 0.5) / (of + 1.0)).collect();
     let mut before: Vec<f64> = fitted.iter().map(|share| (share / (1.0 - share)).ln()).collect();
@@ -174,7 +165,7 @@ fn fit(columns: &[Column], counts: &[Count]) -> Result<Fit, NoModel> {
         let deviance = deviance(counts, &fitted);
         // The deviance is flat at its minimum: one more step lets the coefficients converge as well.
         if is_settled {
-            return Ok(Fit { solution, fitted, deviance });
+            return Ok((solution, fitted));
         }
         let is_still = log_odds.iter().zip(&before).all(|(now, before)| (now - before).abs() <= STILL);
         is_settled = is_still && (deviance - last).abs() <= SETTLED * (deviance.abs() + 0.1);

@@ -21,7 +21,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT}
 pub(crate) const SIGNIFICANCE: f64 = 0.05;
 
 /// The checks of a model. A check that the plots do not allow is `None`.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Checks {
     /// The p-value of the lack of fit. It needs repeated treatments, and more treatments than terms.
     pub lack_of_fit_p: Option<f64>,
@@ -36,7 +36,7 @@ impl Checks {
     pub fn of(design: &Design, values: &[f64], model: &LinearModel) -> Self {
         // A model that fits exactly has no residuals.
         if model.terms.iter().any(|term| term.p.is_none()) {
-            return Self { lack_of_fit_p: None, unequal_scatter_p: None, farthest: None };
+            return Self::default();
         }
         Self {
             lack_of_fit_p: lack_of_fit(design, values, model),

@@ -22,23 +22,12 @@ impl Design {
         Self { levels_km_h: speeds_km_h.clone(), speeds_km_h, spacings_cm, blocks: Vec::new() }
     }
 
-    /// The same plots, each at its nominal speed. Models keep the measured speeds. The analysis of variance compares
-    /// the nominal ones.
-    ///
-    /// # Panics
-    /// If there are more or fewer speeds than plots.
-    pub fn at_levels(self, levels_km_h: Vec<f64>) -> Self {
-        assert_eq!(levels_km_h.len(), self.plots(), "each plot has a nominal speed");
-        Self { levels_km_h, ..self }
-    }
-
-    /// The same plots, each in its block: what differs from block to block is no chance to the analysis of variance.
-    ///
-    /// # Panics
-    /// If there are more or fewer blocks than plots.
-    pub fn in_blocks(self, blocks: Vec<u32>) -> Self {
-        assert_eq!(blocks.len(), self.plots(), "each plot lies in a block");
-        Self { blocks, ..self }
+    /// The speed in km/h, the spacing in cm, the nominal speed in km/h and the block of each plot. Models keep the
+    /// measured speeds. The analysis of variance compares the nominal ones, and what differs from block to block is no
+    /// chance to it.
+    pub fn in_blocks(plots: impl IntoIterator<Item = (f64, f64, f64, u32)>) -> Self {
+        let (speeds_km_h, spacings_cm, levels_km_h, blocks) = plots.into_iter().collect();
+        Self { speeds_km_h, spacings_cm, levels_km_h, blocks }
     }
 
     /// The measured speed and the spacing of each plot.
@@ -196,7 +185,7 @@ pub(super) fn scatter(values: &[f64]) -> f64 {
     values.iter().map(|value| (value - mean).powi(2)).sum()
 }
 
-pub(super) fn varies(values: &[f64]) -> bool {
+fn varies(values: &[f64]) -> bool {
     values.windows(2).any(|pair| pair[0] != pair[1])
 }
 

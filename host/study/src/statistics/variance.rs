@@ -6,7 +6,7 @@
 //! and of the one before. Without blocks the first model is left out.
 
 use super::basis::Basis;
-use super::design::{Design, NoModel, Remark, grouped, is_zero, mean, scatter, varies};
+use super::design::{Design, NoModel, Remark, grouped, is_zero, mean, scatter};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
@@ -59,9 +59,9 @@ impl AnalysisOfVariance {
         if is_zero(scatter(values), values) {
             return Err(NoModel::Constant { value: mean(values) });
         }
-        let (has_speed, has_spacing) = (varies(&design.levels_km_h), varies(&design.spacings_cm));
         let (speeds, spacings) = (levels(&design.levels_km_h), levels(&design.spacings_cm));
         let (treatments, blocks) = (levels(design.treatments()), levels(&design.blocks));
+        let (has_speed, has_spacing) = (speeds.len() > 1, spacings.len() > 1);
 
         let mut remarks = Vec::new();
         let mut in_blocks: Vec<&Levels> = Vec::new();

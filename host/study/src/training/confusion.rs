@@ -51,11 +51,6 @@ impl Confusion {
         self.of(Kind::Weed, Class::Plant) + self.of(Kind::Weed, Class::Unknown)
     }
 
-    /// Plants that are spared because they are unknown.
-    pub fn plants_unknown(&self) -> usize {
-        self.of(Kind::Plant, Class::Unknown)
-    }
-
     /// Share of detections that the machine treats correctly, from 0 to 1.
     pub fn accuracy(&self) -> f64 {
         1.0 - share(self.plants_taken_for_weeds() + self.weeds_taken_for_plants(), self.total())
@@ -63,7 +58,7 @@ impl Confusion {
 
     /// The errors, worst first: plants cut, weeds spared, plants unknown.
     pub(super) fn harm(&self) -> (usize, usize, usize) {
-        (self.plants_taken_for_weeds(), self.weeds_taken_for_plants(), self.plants_unknown())
+        (self.plants_taken_for_weeds(), self.weeds_taken_for_plants(), self.of(Kind::Plant, Class::Unknown))
     }
 }
 
@@ -79,7 +74,7 @@ impl fmt::Display for Confusion {
         let (plants, weeds) = (self.count(Kind::Plant), self.count(Kind::Weed));
         writeln!(f, "Plants classified as weeds   {}", percent(self.plants_taken_for_weeds(), plants))?;
         writeln!(f, "Weeds classified as plants   {}", percent(self.weeds_taken_for_plants(), weeds))?;
-        writeln!(f, "Plants spared unknown    {}", percent(self.plants_unknown(), plants))?;
+        writeln!(f, "Plants spared unknown    {}", percent(self.of(Kind::Plant, Class::Unknown), plants))?;
         write!(f, "Treated as they should   {:.2} % of all", 100.0 * self.accuracy())
     }
 }

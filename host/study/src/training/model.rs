@@ -3,7 +3,8 @@
 use super::confusion::Confusion;
 use super::table::Recorded;
 use super::{Labelled, label_of};
-use comfy_table::{CellAlignment, Table};
+use comfy_table::CellAlignment::{self, Left, Right};
+use comfy_table::Table;
 use control::ground::{
     class::{Class, label},
     examples,
@@ -20,6 +21,22 @@ pub const fn class_of<const CLASSES: usize>(answer: &Answer<CLASSES>) -> Class {
         _ => Class::Unknown,
     }
 }
+
+/// A column of [`Model::table`]: its heading, and its cell for a detection with its number and its answer.
+type Column = (&'static str, CellAlignment, fn(usize, &Recorded, &Answer<{ label::COUNT }>) -> String);
+
+const COLUMNS: [Column; 10] = [
+    ("detection", Right, |number, _, _| number.to_string()),
+    ("speed\nmm/s", Right, |_, of, _| of.features.speed_mm_s().to_string()),
+    ("spacing\nmm", Right, |_, of, _| of.features.spacing_mm().to_string()),
+    ("hold\nmm", Right, |_, of, _| of.features.hold_mm().to_string()),
+    ("answer", Left, |_, _, answer| format!("{:?}", class_of(answer)).to_lowercase()),
+    ("votes\nplant", Right, |_, _, answer| answer.votes[usize::from(label::PLANT)].to_string()),
+    ("votes\nweed", Right, |_, _, answer| answer.votes[usize::from(label::WEED)].to_string()),
+    ("nearest\nsquared", Right, |_, _, answer| answer.nearest.to_string()),
+    ("kind", Left, |_, _, answer| format!("{:?}", answer.kind).to_lowercase()),
+    ("label", Left, |_, of, _| of.kind.map_or(String::new(), |kind| kind.to_string())),
+];
 
 /// A classifier: the examples as in `control::ground::examples`, with their k.
 #[derive(Clone, Debug)]
@@ -58,38 +75,13 @@ impl Model {
     /// # Errors
     /// If k does not suit the number of examples.
     pub fn table(&self, objects: &[Recorded]) -> Result<Table, ClassifyError> {
-        let header = [
-            "detection",
-            "speed\nmm/s",
-            "spacing\nmm",
-            "hold\nmm",
-            "answer",
-            "votes\nplant",
-            "votes\nweed",
-            "nearest\nsquared",
-            "kind",
-            "label",
-        ];
-        let mut table = number_table(header, 0);
-        for (index, Recorded { features, kind }) in objects.iter().enumerate() {
-            let answer = self.answer(features)?;
-            table.add_row([
-                (index + 1).to_string(),
-                features.speed_mm_s().to_string(),
-                features.spacing_mm().to_string(),
-                features.hold_mm().to_string(),
-                format!("{:?}", class_of(&answer)).to_lowercase(),
-                answer.votes[usize::from(label::PLANT)].to_string(),
-                answer.votes[usize::from(label::WEED)].to_string(),
-                answer.nearest.to_string(),
-                format!("{:?}", answer.kind).to_lowercase(),
-                kind.map_or(String::new(), |kind| kind.to_string()),
-            ]);
+        let mut table = number_table(COLUMNS.map(|(heading, ..)| heading), 0);
+        for (column, (_, alignment, _)) in table.column_iter_mut().zip(COLUMNS) {
+            column.set_cell_alignment(alignment);
         }
-        for (index, column) in table.column_iter_mut().enumerate() {
-            if matches!(index, 4 | 8 | 9) {
-                column.set_cell_alignment(CellAlignment::Left);
-            }
+        for (number, object) in (1..).zip(objects) {
+            let answer = self.answer(&object.features)?;
+            table.add_row(COLUMNS.map(|(_, _, cell)| cell(number, object, &answer)));
         }
         Ok(table)
     }

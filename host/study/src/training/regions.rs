@@ -161,16 +161,12 @@ fn ground(model: &Model, class_mm_s: i16, axes: &Axes) -> Group {
 fn dots(objects: &[Labelled], axes: &Axes, ringed: bool) -> Group {
     let mut dots = Group::new();
     for Labelled { features, kind } in objects {
-        let colour = match kind {
-            Kind::Plant => PLANT,
-            Kind::Weed => WEED,
-        };
         let (x, y) = (axes.x(f64::from(features.spacing_mm())), axes.y(f64::from(features.hold_mm())));
         let dot = Circle::new().set("cx", tenth(x)).set("cy", tenth(y));
-        dots = dots.add(if ringed {
-            dot.set("r", 3.6).set("fill", "none").set("stroke", INK).set("stroke-width", 1.3)
-        } else {
-            dot.set("r", 1.5).set("fill", colour)
+        dots = dots.add(match (ringed, kind) {
+            (true, _) => dot.set("r", 3.6).set("fill", "none").set("stroke", INK).set("stroke-width", 1.3),
+            (false, Kind::Plant) => dot.set("r", 1.5).set("fill", PLANT),
+            (false, Kind::Weed) => dot.set("r", 1.5).set("fill", WEED),
         });
     }
     dots

@@ -10,7 +10,7 @@
 //! comes no earlier than the rate allows. The next two edges then come as soon as they may. The beam's edges and the
 //! received bytes come directly before the loop turns interrupts off, so the edge also waits for the critical section.
 //!
-//! [`highest_rate`] finds the rate by bisection to [`RESOLUTION`]. Then it tries rates below it, because edges in step
+//! [`highest_rates`] finds each rate by bisection to [`RESOLUTION`]. Then it tries rates below it, because edges in step
 //! with other events may pass at one rate by chance.
 //!
 //! The firmware is in HOLD. Weeding adds less load than [`Load::Telemetry`], which requests more output than the serial
@@ -24,8 +24,10 @@ use field::machine::encoder_edge;
 use field::wiring;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 use serde::Serialize;
 use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use uno::{CYCLES_PER_SECOND, PinChange, Place, SENT_BYTE_CYCLES, Uno};
 
 /// Fewest counts of a trial: the count's second byte changes more than a hundred times.
@@ -73,8 +75,8 @@ pub struct Turning {
 
 impl Turning {
     /// Without further load and with it: evenly and with [`JITTER`], each forward and backward.
-    pub fn all() -> impl ExactSizeIterator<Item = Self> {
-        (0..8).map(|way| Self {
+    pub fn all() -> [Self; 8] {
+        std::array::from_fn(|way| Self {
             load: [Load::Idle, Load::Telemetry][way / 4],
             direction: [Direction::Forward, Direction::Backward][way % 2],
             jitter: [0.0, JITTER][way / 2 % 2],
@@ -320,18 +322,25 @@ fn follow(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Option<Rate
     Ok(Some(Rate { turning, counts_per_s, line_share }))
 }
 
-/// Searches the highest rate of the firmware at `elf`. `progress` gets the share of the search done, from 0 to 1.
+/// Searches the highest rate of the firmware at `elf` for each of [`Turning::all`], in parallel. `progress` gets the share
+/// of the searches done, from 0 to 1.
 ///
 /// # Errors
 /// If the ELF cannot be run.
-pub fn highest_rate(elf: &Path, turning: Turning, mut progress: impl FnMut(f64)) -> Result<Rate> {
+pub fn highest_rates(elf: &Path, progress: impl Fn(f64) + Sync) -> Result<Vec<Rate>> {
     let bisections = ((HIGHEST_PER_S / LOWEST_PER_S).ln() / RESOLUTION.ln_1p()).log2().ceil();
-    let trials = bisections + BELOW.len() as f64;
-    let mut done = 0.0;
-    let mut follow = |counts_per_s: f64| {
+    let turnings = Turning::all();
+    let trials = (bisections + BELOW.len() as f64) * turnings.len() as f64;
+    let done = AtomicUsize::new(0);
+    let tried = || progress(((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / trials).min(1.0));
+    turnings.into_par_iter().map(|turning| highest_rate(elf, turning, tried)).collect()
+}
+
+/// Searches the highest rate. Calls `tried` after each trial.
+fn highest_rate(elf: &Path, turning: Turning, tried: impl Fn()) -> Result<Rate> {
+    let follow = |counts_per_s: f64| {
         let followed = follow(elf, turning, counts_per_s);
-        done += 1.0;
-        progress((done / trials).min(1.0));
+        tried();
         followed
     };
     let mut failed = HIGHEST_PER_S;

@@ -92,7 +92,7 @@ fn logged_at(port: HostPort, mut typed: Option<ChaCha8Rng>, commands: &[&str], e
                 let is_there = i64::from(status.position) > end;
                 standing = if is_there { standing + 1 } else { 0 };
             }
-            log.write_at(ms.load(Ordering::Relaxed), &happening).expect("the log can be written");
+            log.write(ms.load(Ordering::Relaxed), &happening).expect("the log can be written");
         }
     }
     log::read(&path).expect("the log is one")

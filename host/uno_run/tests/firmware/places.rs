@@ -112,7 +112,7 @@ fn recorded(
         let time_ms = (since_s * 1000.0) as u64;
         for happening in happened {
             assert!(!matches!(happening, Happening::Lost(_)), "{happening:?}");
-            log.write_at(time_ms, &happening).expect("the log can be written");
+            log.write(time_ms, &happening).expect("the log can be written");
             recorder.happened(time_ms, &happening);
             // A label for the last object, once.
             if let Happening::Event(_, line) = &happening

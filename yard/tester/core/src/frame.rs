@@ -51,8 +51,7 @@ impl Receiver {
         Self { bytes: Vec::new(), is_too_long: false }
     }
 
-    /// Takes a byte. Returns the number and message of the frame that it completes. A frame that noise has damaged gives
-    /// `None`.
+    /// Takes a byte. Returns number and message of the frame that it completes; `None` if noise has damaged it.
     pub fn take<Message: for<'a> Deserialize<'a>>(&mut self, byte: u8) -> Option<(u8, Message)> {
         if byte != 0 {
             self.is_too_long |= self.bytes.push(byte).is_err();

@@ -1,9 +1,7 @@
 //! The tester: a second Uno that drives the weeder's inputs and measures its outputs.
 //!
-//! This crate holds the decisions of its firmware, and the protocol of its serial line. [`frame`] turns messages into frames and
-//! back, and finds damaged ones. [`message`] lists the messages. [`player`] plays a plan: levels on the lines at given
-//! cycles. [`station`] runs commands and sends records. [`pins`] lists the wires. Registers are in the firmware (`yard/tester/src/`), so
-//! a computer can test all of this.
+//! This crate holds the decisions of its firmware, and the protocol of its serial line. Registers are in the firmware
+//! (`yard/tester/src/`), so a computer can test all of this.
 
 #![no_std]
 #![forbid(unsafe_code)]

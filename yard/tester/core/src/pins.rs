@@ -2,10 +2,8 @@
 //!
 //! The six lines of [`Line`] are port C, so that one write changes all of them. The firmware uses the same bits.
 
-use serde::{Deserialize, Serialize};
-
 /// A line that the tester drives, and its bit of port C.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Line {
     /// Encoder channel A.

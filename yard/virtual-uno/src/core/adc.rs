@@ -5,12 +5,10 @@
 //! sheet, table 24-1). simavr multiplies these clocks by 2 or 14 and drops all but 8 bits of the product. The result
 //! has 1024 steps of the reference (data sheet, 24.7); simavr has 1023.
 //!
-//! AVCC and the pin AREF are at 5 V. The temperature sensor and noise are not simulated, and free running is the only
-//! trigger.
-
-use simavr_ffi as simavr;
+//! AVCC and AREF are at 5 V. There is no temperature sensor and no noise, and free running is the only trigger.
 
 use super::chip::Chip;
+use simavr_ffi as simavr;
 
 /// Inputs that are pins of the board.
 pub(super) const ADC_CHANNELS: usize = 6;

@@ -1,12 +1,10 @@
 //! A chip in simavr: its I/O registers, the peripherals behind them, and simavr's functions for writes to them.
 //!
-//! simavr stores a function and its parameter for each register, and calls it with the written byte. A correction
-//! stores simavr's own writer and puts its own function in its place. That function calls simavr's for the parts that
-//! are right.
-
-use std::ffi::c_void;
+//! simavr stores a function and its parameter for each register, and calls it with the written byte. A correction puts
+//! its own function in place of simavr's, and calls simavr's for the parts that are right.
 
 use simavr_ffi as simavr;
+use std::ffi::c_void;
 
 /// Addresses of the I/O registers in the data space (data sheet, figure 8-3). simavr counts registers from the first.
 const IO: std::ops::Range<u16> = 0x20..0x100;
@@ -17,7 +15,6 @@ pub(super) struct Chip(*mut simavr::avr_t);
 
 impl Chip {
     /// # Safety
-    ///
     /// `avr` must be an initialised chip for as long as the result is used. No reference into its I/O registers or into
     /// their writers may be alive when a method is called.
     pub(super) unsafe fn of(avr: *mut simavr::avr_t) -> Chip {
@@ -64,7 +61,6 @@ impl Chip {
     /// Replaces the writer of an I/O register by `function`, which is called with `parameter`.
     ///
     /// # Safety
-    ///
     /// `function` must be sound with `parameter` at every write that the chip makes.
     pub(super) unsafe fn replace_writer(
         self,
@@ -90,7 +86,6 @@ impl Writer {
     /// Has the register written.
     ///
     /// # Safety
-    ///
     /// `chip` must be the chip that this writer is of.
     pub(super) unsafe fn write(self, chip: Chip, register: u16, value: u8) {
         if let Some(function) = self.function {

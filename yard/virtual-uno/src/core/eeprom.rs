@@ -6,18 +6,16 @@
 //!
 //! Only writes that erase first are timed (EEPM 00). The core is not halted for the few cycles after a command.
 
-use std::ffi::c_void;
-
-use simavr_ffi as simavr;
-
 use super::chip::{Chip, Writer};
 use crate::pins::CYCLES_PER_SECOND;
+use simavr_ffi as simavr;
+use std::ffi::c_void;
 
 /// Cycles of a write (data sheet, table 8-1): the first half erases the byte, the second writes it.
 pub(super) const WRITE_CYCLES: u64 = CYCLES_PER_SECOND * 34 / 10_000;
 
 // Registers by their address in the data space (data sheet, register summary).
-const EECR: u16 = 0x3F;
+pub(super) const EECR: u16 = 0x3F;
 const EEARL: u16 = 0x41;
 const EEARH: u16 = 0x42;
 
@@ -61,20 +59,14 @@ impl Eeprom {
     }
 }
 
-/// Replaces simavr's writer of EECR by the one in this file.
-///
-/// # Safety
-///
-/// `eeprom` must be the chip's. It must not move while the chip runs, and no reference to it may be alive while the chip
-/// runs.
-pub(super) unsafe fn take_over_writes(chip: Chip, eeprom: *mut Eeprom) {
-    // SAFETY: the caller guarantees `eeprom`.
-    unsafe { chip.replace_writer(EECR, on_control_write, eeprom.cast()) };
-}
-
-/// simavr's callback for a write of EECR.
-unsafe extern "C" fn on_control_write(avr: *mut simavr::avr_t, register: u16, value: u8, parameter: *mut c_void) {
-    // SAFETY: `parameter` is the one that `take_over_writes` registered, alive and not borrowed, and `avr` its chip.
+/// simavr's callback for a write of EECR. `parameter` is the chip's EEPROM.
+pub(super) unsafe extern "C" fn on_control_write(
+    avr: *mut simavr::avr_t,
+    register: u16,
+    value: u8,
+    parameter: *mut c_void,
+) {
+    // SAFETY: `parameter` is the one that `Core::new` registered, alive and not borrowed, and `avr` its chip.
     unsafe {
         let (chip, eeprom) = (Chip::of(avr), parameter.cast::<Eeprom>());
         if (*eeprom).write.is_some() {

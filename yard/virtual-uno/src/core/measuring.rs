@@ -1,5 +1,4 @@
-//! Measuring: for each interrupt vector a count and the range of its cycles, the longest time with interrupts off, and
-//! the turns of the main loop.
+//! Measuring: count and cycles of each interrupt vector, the longest time with interrupts off, turns of the main loop.
 //!
 //! A turn lasts from one `wdr` instruction to the next. So this works for any loop that feeds the watchdog once a turn.
 //! The time of interrupts during a turn is included, sleep is not. Both recorders are off by default, because watching
@@ -70,8 +69,7 @@ pub(crate) struct InterruptRecorder {
     running: Vec<(u8, u64)>,
     off_since: Option<u64>,
     critical_since: Option<u64>,
-    /// Interrupts have been on since measuring began, and since the last reset. So the instruction that turned them off
-    /// is known.
+    /// Interrupts have been on since the beginning and the last reset: the instruction that turned them off is known.
     knows_who: bool,
 }
 

@@ -9,10 +9,6 @@
 //! (data sheet, section 14.3). simavr copies a timer's level into PORTx. A firmware that reads PORTx before an edge and
 //! writes it back after the edge would undo the edge. So the recorder stores the level of a connected output.
 
-use std::ffi::c_void;
-
-use simavr_ffi as simavr;
-
 use super::adc::{self, ADC_CHANNELS};
 use super::chip::Chip;
 use super::eeprom::Eeprom;
@@ -20,6 +16,8 @@ use super::measuring::{InterruptRecorder, TurnRecorder};
 use super::timer::Timer1;
 use super::uart;
 use crate::pins::{Pin, PinChange};
+use simavr_ffi as simavr;
+use std::ffi::c_void;
 
 /// Cycles from the end of an instruction to the first one of the vector (data sheet, section 7.7.1).
 const INTERRUPT_ENTRY_CYCLES: u64 = 4;
@@ -99,8 +97,8 @@ impl Recorder {
 
     /// Records the levels of a port, from the present values of its registers.
     fn record_port(&mut self, name: char, direction: u8, port: u8) {
-        for bit in 0..8 {
-            let Some(pin) = Pin::at(name, bit) else { continue };
+        for pin in Pin::ALL.into_iter().filter(|pin| pin.port_and_bit().0 == name) {
+            let (_, bit) = pin.port_and_bit();
             let timer = timer_level(self.chip, pin, &self.timer_levels);
             let high = direction & 1 << bit != 0 && timer.unwrap_or(port & 1 << bit != 0);
             if self.is_driven_high(pin) != high {

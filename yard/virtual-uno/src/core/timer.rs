@@ -5,22 +5,19 @@
 //! pins disconnected and with the compare value of the running period's start. In other modes simavr's writers work
 //! alone.
 //!
-//! Only the non-inverting output A is corrected. A counter that is set above its top restarts at the bottom, as in
-//! simavr.
-
-use std::ffi::c_void;
-
-use simavr_ffi as simavr;
+//! Only the non-inverting output A is corrected. A counter above its top restarts at the bottom, as in simavr.
 
 use super::chip::{Chip, Writer};
+use simavr_ffi as simavr;
+use std::ffi::c_void;
 
 // Registers by their address in the data space (data sheet, register summary).
 const TCNT0: u16 = 0x46;
 const TCCR1A: u16 = 0x80;
 const TCCR1B: u16 = 0x81;
-const TCNT1L: u16 = 0x84;
+pub(super) const TCNT1L: u16 = 0x84;
 const TCNT1H: u16 = 0x85;
-const OCR1AL: u16 = 0x88;
+pub(super) const OCR1AL: u16 = 0x88;
 const OCR1AH: u16 = 0x89;
 const TCNT2: u16 = 0xB2;
 
@@ -53,8 +50,7 @@ impl Timer1 {
     /// Records a level of output A. In fast PWM it rises at the bottom, where OCR1A's buffer takes effect.
     pub(super) fn output_becomes(&mut self, high: bool) {
         if high {
-            // SAFETY: the timer lives as long as its chip, which outlives `self`, and simavr does not change it
-            // meanwhile.
+            // SAFETY: the timer lives as long as its chip, which outlives `self`. simavr does not change it now.
             self.running_compare_cycles = unsafe { (*self.timer).comp[0].comp_cycles };
         }
     }
@@ -82,23 +78,9 @@ pub(super) fn stop_all(chip: Chip, timer1: &Timer1) {
     }
 }
 
-/// Replaces simavr's writers of OCR1A and TCNT1 by those in this file.
-///
-/// # Safety
-///
-/// `timer` must be the chip's. It must not move while the chip runs, and no reference to it may be alive while the chip
-/// runs.
-pub(super) unsafe fn take_over_writes(chip: Chip, timer: *mut Timer1) {
-    // SAFETY: the caller guarantees `timer`.
-    unsafe {
-        chip.replace_writer(OCR1AL, on_compare_write, timer.cast());
-        chip.replace_writer(TCNT1L, on_counter_write, timer.cast());
-    }
-}
-
-/// simavr's callback for a write of OCR1A's low byte; the high byte is in its register.
-unsafe extern "C" fn on_compare_write(avr: *mut simavr::avr_t, register: u16, low: u8, timer1: *mut c_void) {
-    // SAFETY: `timer1` is the one that `take_over_writes` registered, alive and not borrowed, and `avr` its chip.
+/// simavr's callback for a write of OCR1A's low byte; the high byte is in its register. `timer1` is the chip's.
+pub(super) unsafe extern "C" fn on_compare_write(avr: *mut simavr::avr_t, register: u16, low: u8, timer1: *mut c_void) {
+    // SAFETY: `timer1` is the one that `Core::new` registered, alive and not borrowed, and `avr` its chip.
     // simavr's writer may call back, so no reference into it is kept over the call.
     unsafe {
         let (chip, timer1) = (Chip::of(avr), timer1.cast::<Timer1>());
@@ -117,8 +99,8 @@ unsafe extern "C" fn on_compare_write(avr: *mut simavr::avr_t, register: u16, lo
     }
 }
 
-/// simavr's callback for a write of TCNT1's low byte; the high byte is in its register.
-unsafe extern "C" fn on_counter_write(avr: *mut simavr::avr_t, register: u16, low: u8, timer1: *mut c_void) {
+/// simavr's callback for a write of TCNT1's low byte; the high byte is in its register. `timer1` is the chip's.
+pub(super) unsafe extern "C" fn on_counter_write(avr: *mut simavr::avr_t, register: u16, low: u8, timer1: *mut c_void) {
     // SAFETY: as in `on_compare_write`.
     unsafe {
         let (chip, timer1) = (Chip::of(avr), timer1.cast::<Timer1>());

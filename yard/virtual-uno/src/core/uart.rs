@@ -5,12 +5,10 @@
 //! select. It is available when its stop bit ends, and is lost if three bytes wait. The transmitter's second buffer is
 //! not simulated.
 
+use super::chip::Chip;
 use simavr_ffi as simavr;
 
-use super::chip::Chip;
-
-/// Complete bytes that the receiver holds: two in its buffer and one in the shift register (data sheet, USART0,
-/// receiver error flags).
+/// Bytes that the receiver holds: two in its buffer, one in the shift register (data sheet, receiver error flags).
 const RECEIVER_BYTES: u16 = 3;
 
 // Registers by their address in the data space (data sheet, register summary).
@@ -34,8 +32,7 @@ const USBS0: u8 = 1 << 3;
 /// UCSR0C: parity is on.
 const UPM01: u8 = 1 << 5;
 
-/// Cycles of a byte on the serial line, from the UART's registers (data sheet, USART0, clock generation and frame
-/// formats).
+/// Cycles of a byte, from the UART's registers (data sheet, USART0, clock generation and frame formats).
 pub(super) fn cycles_per_byte(chip: Chip) -> u64 {
     let divisor = u64::from(u16::from_le_bytes([chip.read(UBRR0L), chip.read(UBRR0H) & 0x0F])) + 1;
     let cycles_per_bit = match chip.read(UCSR0A) & U2X0 {
@@ -75,7 +72,7 @@ pub(super) fn hand_over_received(chip: Chip) {
 /// Gives the receiver a byte whose stop bit has just ended. Returns whether it had room.
 pub(super) fn receive(chip: Chip, byte: u8) -> bool {
     let uart = of(chip);
-    // SAFETY: as in `hand_over_received`.
+    // SAFETY: as in `hand_over_received`; the UART has the line of its input.
     unsafe {
         let waiting = (*uart).input.write.wrapping_sub((*uart).input.read) % (*uart).input.buffer.len() as u16;
         if chip.read(UCSR0B) & RXEN0 != 0 && waiting >= RECEIVER_BYTES {
@@ -84,14 +81,8 @@ pub(super) fn receive(chip: Chip, byte: u8) -> bool {
         }
         // simavr would set the flag a whole byte later; it is due now.
         (*uart).cycles_per_byte = 1;
-        flood(chip, byte);
+        simavr::avr_raise_irq((*uart).io.irq.add(simavr::UART_IRQ_INPUT as usize), byte.into());
         (*uart).cycles_per_byte = cycles_per_byte(chip);
     }
     true
-}
-
-/// Gives the receiver a byte, independent of the line's pace and the receiver's room.
-pub(super) fn flood(chip: Chip, byte: u8) {
-    // SAFETY: as in `hand_over_received`; the UART has this line.
-    unsafe { simavr::avr_raise_irq((*of(chip)).io.irq.add(simavr::UART_IRQ_INPUT as usize), byte.into()) };
 }

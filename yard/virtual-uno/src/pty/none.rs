@@ -13,10 +13,8 @@ impl Pty {
     /// # Errors
     /// Always.
     pub fn open() -> Result<Pty, FileError> {
-        Err(FileError::new(
-            Path::new("the virtual Uno's serial port"),
-            "needs Linux: this system has no such terminals",
-        ))
+        let port = Path::new("the virtual Uno's serial port");
+        Err(FileError::new(port, "needs Linux: this system has no such terminals"))
     }
 
     /// As on Linux.
@@ -25,33 +23,21 @@ impl Pty {
     }
 
     /// As on Linux.
-    ///
-    /// # Errors
-    /// None.
     pub fn link(&mut self, _: &Path) -> Result<(), FileError> {
         match *self {}
     }
 
     /// As on Linux.
-    ///
-    /// # Errors
-    /// None.
     pub fn was_opened(&mut self) -> Result<bool, FileError> {
         match *self {}
     }
 
     /// As on Linux.
-    ///
-    /// # Errors
-    /// None.
     pub fn read(&mut self, _: &mut [u8]) -> Result<usize, FileError> {
         match *self {}
     }
 
     /// As on Linux.
-    ///
-    /// # Errors
-    /// None.
     pub fn write(&mut self, _: &[u8]) -> Result<usize, FileError> {
         match *self {}
     }
