@@ -41,7 +41,7 @@ pub fn ask(uno: &mut Uno, command: &str) -> Vec<String> {
 #[track_caller]
 pub fn refusal(uno: &mut Uno, command: &str) -> String {
     match console::ask(uno, command) {
-        Err(ConsoleError::Refused { answer, .. }) => answer,
+        Err(ConsoleError::Refused(refused)) => refused.answer,
         other => panic!("`{command}` was not refused: {other:?}"),
     }
 }

@@ -5,6 +5,7 @@ use model_test::{
     Failure, cases,
     decisions::Decisions,
     drive,
+    machine::Machine,
     run::{Run, Step},
 };
 use rayon::prelude::*;
@@ -68,7 +69,11 @@ fn the_rest_of_a_half_seen_plant_is_no_weed_after_an_alarm() {
                     800 + seen_mm
                 ),
             ));
-            assert_eq!((drive.state(), drive.tool_out()), (State::Work, false), "the machine continues to work");
+            assert_eq!(
+                (drive.machine().state(), drive.machine().tool_out()),
+                (State::Work, false),
+                "the machine continues to work"
+            );
         }
     }
 }
@@ -103,7 +108,7 @@ fn a_line_in_the_last_turn_of_a_dry_run_leaves_real_plants_their_zones() {
         for ms in 2672..2712 {
             let lines = format!("test row 1300\nstand for {ms} ms\n{line}\nhold\nstart\nroll 2500 mm at 700 mm/s");
             let drive = go(&run(&ROW, &lines));
-            assert_eq!(drive.state(), State::Work);
+            assert_eq!(drive.machine().state(), State::Work);
         }
     }
 }
@@ -140,7 +145,7 @@ fn leads_near_each_other_give_one_swing_each_way_a_zone_at_every_speed() {
                  roll {} mm at {mm_s} mm/s",
                 mm_s * 2 + 2500
             );
-            go(&run(&[(450, 150), (700, 150), (60, 90)], &lines)).steady_swings()
+            go(&run(&[(450, 150), (700, 150), (60, 90)], &lines)).steady_swings
         });
         swings.sum()
     };
@@ -159,14 +164,14 @@ fn a_tool_driven_directly_is_not_stuck_when_the_machine_takes_it_out_again() {
                     "set end_switch on\nstand for 2000 ms\n{moved}\nstand for {ms} ms\n{back}\nstand for 1500 ms"
                 );
                 let drive = go(&run(&ROW, &lines));
-                assert!(!matches!(drive.state(), State::Alarm(Alarm::ToolStuck)), "{lines}");
+                assert!(!matches!(drive.machine().state(), State::Alarm(Alarm::ToolStuck)), "{lines}");
             }
             let lines = format!("set end_switch on\nstand for 2000 ms\n{moved}\nstand for {ms} ms");
             let mut run = run(&ROW, &lines);
             for on in [true, false] {
                 run.steps.extend([Step::Switch { on }, Step::Stand { ms: 1500 }]);
             }
-            assert_eq!(go(&run).state(), State::Hold);
+            assert_eq!(go(&run).machine().state(), State::Hold);
         }
     }
 }
@@ -176,9 +181,9 @@ fn a_dry_run_ends_at_every_accepted_speed() {
     for mm_s in (100..1200).step_by(50).chain(1200..=1300) {
         let ms = 3500 * 1000 / mm_s;
         let played = |ms| go(&run(&ROW, &format!("test row {mm_s}\nstand for {ms} ms")));
-        assert!(!played(ms - 20).tool_out(), "{mm_s} mm/s");
+        assert!(!played(ms - 20).machine().tool_out(), "{mm_s} mm/s");
         let after = played(ms + 20);
-        assert_eq!((after.state(), after.tool_out()), (State::Hold, true), "{mm_s} mm/s");
+        assert_eq!((after.machine().state(), after.machine().tool_out()), (State::Hold, true), "{mm_s} mm/s");
     }
 }
 

@@ -27,7 +27,7 @@ const ROWS: u64 = 50;
 
 /// Measures and prints the figures.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let bench_elf = firmware::build_bench()?;
+    let bench_elf = firmware::BENCH.elf()?;
     let elf = firmware::build()?;
     let classifier = with_bar("classifying", |show| bench::classifier(&bench_elf, show))?;
     let rates = with_bar("turning the encoder", |show| encoder::highest_rates(&elf, show))?;

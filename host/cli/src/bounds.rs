@@ -72,7 +72,7 @@ impl Firmware {
     pub fn elf(&self) -> Result<PathBuf> {
         Ok(match &self.elf {
             Some(elf) => elf.clone(),
-            None if self.tester => firmware::build_tester()?,
+            None if self.tester => firmware::TESTER.elf()?,
             None => firmware::build()?,
         })
     }

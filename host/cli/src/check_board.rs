@@ -61,7 +61,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let page = arguments.page.as_ref().map(|page| page.file(arguments.replace)).transpose()?;
     let second = arguments.second_simulator.as_deref();
-    let start = || Desk::start(&firmware::build_tester()?, &firmware::build()?, second);
+    let start = || Desk::start(&firmware::TESTER.elf()?, &firmware::build()?, second);
     let desk = arguments.simulated.then(start).transpose()?;
     let name = |path: &Path| Some(path.to_string_lossy().into_owned());
     let (port, tester) = match &desk {

@@ -149,7 +149,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         spacing_cm: arguments.spacing,
         seed: arguments.seed,
     };
-    sweep.warnings()?.iter().for_each(|warning| tell!("Warning: {warning}"));
+    sweep.warning()?.iter().for_each(|warning| tell!("Warning: {warning}"));
     if let Some(part) = Part::asked(arguments.shard, out.as_ref(), replace)? {
         let outcomes = with_bar("sweeping", |show| sweep.run_shard(part.shard, show))?;
         return part.write(COMMAND, sweep.size(), &sweep, outcomes);

@@ -121,10 +121,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let count = arguments.rows;
     let rows = (0..count as u64).map(|number| arguments.course.nth_row(number)).collect::<Result<Vec<_>>>()?;
     let conditions = arguments.course.conditions_of(&arguments.course.field)?;
-    let courses = Course::of_rows(rows, conditions.machine(arguments.course.seed), mm_s(arguments.course.speed))
-        .into_iter()
-        .map(|course| course.slipping(conditions.ground.slip_percent / 100.0))
-        .collect::<Vec<_>>();
+    let (machine, speed_mm_s) = (conditions.machine(arguments.course.seed), mm_s(arguments.course.speed));
+    let courses = Course::of_rows(rows, machine, speed_mm_s, conditions.ground.slip_percent / 100.0);
     ensure!(!arguments.roll || count == 1, "--roll is for one row: leave out --rows");
     if arguments.roll {
         let Machine { wheel_mm, beam_to_tool_mm, second_beam_mm, tool_width_mm, .. } = conditions.machine(0);
@@ -234,11 +232,10 @@ fn of_row(path: &Path, row: usize, count: usize) -> PathBuf {
 fn cost(ran: Ran, count: usize) -> String {
     let rows = if count == 1 { "a row".to_owned() } else { format!("{count} rows") };
     let threads = if ran.threads == 1 { "one thread".to_owned() } else { format!("{} threads", ran.threads) };
+    let [simulated_s, took_s, cores_s] = [ran.simulated, ran.took, ran.cores].map(|time| time.as_secs_f64());
     format!(
-        "{rows} in {threads}: {:.1} s of their own time took {:.1} s, which is {:.2} times real time; in real time a row takes {:.2} of a core",
-        ran.simulated.as_secs_f64(),
-        ran.took.as_secs_f64(),
-        ran.times_real_time(),
-        ran.cores_in_real_time() / count as f64
+        "{rows} in {threads}: {simulated_s:.1} s of their own time took {took_s:.1} s, which is {:.2} times real time; in real time a row takes {:.2} of a core",
+        simulated_s / took_s.max(f64::EPSILON),
+        cores_s / simulated_s.max(f64::EPSILON) / count as f64
     )
 }

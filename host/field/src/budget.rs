@@ -110,8 +110,7 @@ impl Budget {
         by_remainder.sort_by(|&a, &b| exact[b].fract().total_cmp(&exact[a].fract()));
         let missing = 1000_u32.saturating_sub(tenths.iter().sum()) as usize;
         by_remainder.into_iter().take(missing).for_each(|index| tenths[index] += 1);
-        let mut index = 0..;
-        Part::ALL.map(|part| (part, tenths[index.next().unwrap_or_default()]))
+        Part::ALL.map(|part| (part, tenths[part as usize]))
     }
 
     /// The largest part except weeded ground, with its share.
@@ -152,7 +151,7 @@ pub fn part_of(zone_mm: &Range<f64>, row: &Row) -> Part {
     };
     let of =
         |kind: Kind| row.canopies().iter().filter(move |canopy| canopy.kind == kind).map(|canopy| canopy.position_mm);
-    let dust = row.dust_mm().iter().map(|dust_mm| (dust_mm.start + dust_mm.end) / 2.0);
+    let dust = row.dust_mm.iter().map(|dust_mm| (dust_mm.start + dust_mm.end) / 2.0);
     let to_plant_mm = nearest_mm(&mut of(Kind::Plant));
     let is_over_plant = of(Kind::Plant).any(|place_mm| zone_mm.contains(&place_mm));
     if is_over_plant || to_plant_mm <= nearest_mm(&mut of(Kind::Weed).chain(dust)) { Part::Plants } else { Part::Weeds }
@@ -219,9 +218,9 @@ mod tests {
 
     #[test]
     fn a_zone_is_the_plant_s_whose_middle_is_nearest_even_where_the_wheel_slips() {
-        let row = Row::new(vec![Canopy::plant(1000.0, 150.0), Canopy::weed(1110.0, 16.0), Canopy::plant(1500.0, 20.0)])
-            .unwrap();
-        let row = row.with_dust(vec![1300.0..1302.0]);
+        let canopies = vec![Canopy::plant(1000.0, 150.0), Canopy::weed(1110.0, 16.0), Canopy::plant(1500.0, 20.0)];
+        let mut row = Row::new(canopies).unwrap();
+        row.dust_mm = vec![1300.0..1302.0];
         let part = |zone_mm: Range<f64>| part_of(&zone_mm, &row);
         assert_eq!(part(905.0..1055.0), Part::Plants);
         // The weed's zone, 20 mm early: nearer to the canopy than to the weed.

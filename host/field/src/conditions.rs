@@ -55,25 +55,19 @@ impl Conditions {
     /// # Errors
     /// If it is neither, or something in the file is wrong: with the line.
     pub fn load(preset_or_file: &str) -> Result<Self, FileError> {
+        if let Some(conditions) = Self::preset(preset_or_file) {
+            return conditions;
+        }
         let path = Path::new(preset_or_file);
-        match Self::preset(preset_or_file) {
-            Some(conditions) => conditions,
-            None => {
+        match bounded_file::text(path) {
+            // A file that is there has an error of its own.
+            Err(FileError::File { source, .. }) if source.kind() == ErrorKind::NotFound => {
                 let meant = near(preset_or_file, presets()).map(|near| format!("; did you mean {near}?"));
-                let presets = presets().collect::<Vec<_>>().join(", ");
-                let problem = format!(
-                    "is none of the presets ({presets}), and as a file it cannot be read{}",
-                    meant.unwrap_or_default()
-                );
-                // A file that is there has an error of its own.
-                let text = match bounded_file::text(path) {
-                    Err(FileError::File { source, .. }) if source.kind() == ErrorKind::NotFound => {
-                        return Err(FileError::unusable(path, problem, source));
-                    }
-                    read => read?,
-                };
-                Self::parse(path, &text)
+                let (presets, meant) = (presets().collect::<Vec<_>>().join(", "), meant.unwrap_or_default());
+                let problem = format!("is none of the presets ({presets}), and as a file it cannot be read{meant}");
+                Err(FileError::unusable(path, problem, source))
             }
+            read => Self::parse(path, &read?),
         }
     }
 
@@ -140,18 +134,17 @@ impl Conditions {
     }
 
     /// What is likely wrong with these conditions, in sentences.
-    pub fn warnings(&self) -> Vec<String> {
+    pub fn warning(&self) -> Option<String> {
         let room_mm = self.machine.sweep_from_mm - self.crop.protected_mm / 2.0 - self.crop.across_scatter_mm;
         let strays_mm = self.driving.steering_mm;
         let strays_too_far = self.machine.sweeps_a_side > 0 && strays_mm > room_mm;
-        let warning = strays_too_far.then(|| {
+        strays_too_far.then(|| {
             format!(
                 "driving.steering_mm is {strays_mm}, but the sweeps leave {room_mm:.1} mm: they cut plants. \
                  Set machine.sweep_from_mm to {:.0} or more.",
                 (self.machine.sweep_from_mm + strays_mm - room_mm).ceil()
             )
-        });
-        warning.into_iter().collect()
+        })
     }
 
     /// The same field and machine before anything is fitted, set or measured.

@@ -82,8 +82,7 @@ pub fn drive(conditions: &Conditions, span_mm: &Range<f64>, speed_km_h: f64, rng
     let row_s = passed_s(span_mm.end) - passed_s(span_mm.start);
     let turn_s = driving.turn_m * 1000.0 / mm_s(speed_km_h) + driving.turn_s * (1.0 + scatter(rng, STOP_SCATTER));
     let strays_mm = span_mm.start - RUN_OUT_MM..end_mm;
-    let steering = Steering::within(driving.steering_mm, strays_mm.clone(), rng);
-    let steering = steering.with_play(machine.side_play_mm, strays_mm, rng);
+    let steering = Steering::within(driving.steering_mm, machine.side_play_mm, strays_mm, rng);
     Drive { motion, row_s, turn_s, steering }
 }
 
@@ -108,14 +107,11 @@ struct Strays {
 const PLAY_MM: Range<f64> = 200.0..600.0;
 
 impl Steering {
-    /// A machine that strays by up to `within_mm` on this ground.
-    pub fn within(within_mm: f64, ground_mm: Range<f64>, rng: &mut impl Rng) -> Self {
-        Self { machine: Strays::within(within_mm, ground_mm, LEG_MM, rng), ..Self::default() }
-    }
-
-    /// The same, with a tool that has up to `play_mm` of play to either side.
-    pub fn with_play(self, play_mm: f64, ground_mm: Range<f64>, rng: &mut impl Rng) -> Self {
-        Self { tool: Strays::within(play_mm, ground_mm, PLAY_MM, rng), ..self }
+    /// A machine that strays by up to `within_mm` on this ground, with a tool that has up to `play_mm` of play to either
+    /// side.
+    pub(crate) fn within(within_mm: f64, play_mm: f64, ground_mm: Range<f64>, rng: &mut impl Rng) -> Self {
+        let machine = Strays::within(within_mm, &ground_mm, LEG_MM, rng);
+        Self { machine, tool: Strays::within(play_mm, &ground_mm, PLAY_MM, rng) }
     }
 
     /// Deviation of the machine's middle from the row's line, when its tool works this ground.
@@ -135,7 +131,7 @@ impl Steering {
 }
 
 impl Strays {
-    fn within(within_mm: f64, ground_mm: Range<f64>, leg_mm: Range<f64>, rng: &mut impl Rng) -> Self {
+    fn within(within_mm: f64, ground_mm: &Range<f64>, leg_mm: Range<f64>, rng: &mut impl Rng) -> Self {
         if within_mm <= 0.0 {
             return Self::default();
         }
@@ -214,7 +210,7 @@ mod tests {
 
     #[test]
     fn the_machine_strays_within_its_limits_and_gradually() {
-        let steering = Steering::within(15.0, 0.0..20_000.0, &mut ChaCha8Rng::seed_from_u64(1));
+        let steering = Steering::within(15.0, 0.0, 0.0..20_000.0, &mut ChaCha8Rng::seed_from_u64(1));
         let places: Vec<f64> = (-100..2100).map(|place| steering.across_mm(f64::from(place) * 10.0)).collect();
         assert!(places.iter().all(|across| across.abs() <= 15.0));
         // From one limit to the other takes a metre at least: 0.3 mm in 10.

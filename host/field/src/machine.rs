@@ -18,6 +18,7 @@ use crate::row::Row;
 use crate::servo::Servo;
 use crate::sight::half_covered;
 use crate::wiring;
+use control::measure::quadrature::{Channels, Quadrature, Step};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 use std::f64::consts::PI;
@@ -146,11 +147,6 @@ impl Machine {
         (self.tool_width_mm / 2.0 / self.arm_mm).min(1.0).asin().to_degrees()
     }
 
-    /// Share of a stroke during which the tool does not work the row's line.
-    pub fn idle_share_of_stroke(&self) -> f64 {
-        (1.0 - self.line_degrees() / self.servo.stroke_degrees()).max(0.0)
-    }
-
     /// How far from the row's line the tool's nearer edge is when it is fully out.
     pub fn room_mm(&self) -> f64 {
         self.across_mm(self.servo.stroke_degrees()) - self.tool_width_mm / 2.0
@@ -171,19 +167,18 @@ impl Machine {
     /// The level of each beam's line at power-up, before the motion begins: the first beam's, and the second one's if
     /// there is one.
     pub fn beams_before(&self, row: &Row, motion: &Motion) -> Vec<PinChange> {
-        let leaves_mm = self.leaves_mm(row);
-        self.beams(leaves_mm.each_ref().map(Vec::as_slice), motion.start_mm(), 0).iter().map(|beam| beam.last).collect()
+        self.beams(&self.leaves_mm(row), motion.start_mm(), 0).iter().map(|beam| beam.last).collect()
     }
 
     /// The stretches over which each beam's sensor reports it as broken.
     fn leaves_mm(&self, row: &Row) -> [Vec<Range<f64>>; 2] {
-        [0, 1].map(|beam| self.seen_mm(row.blocks_of_beam_mm(beam)))
+        [0, 1].map(|beam| half_covered(row.blocks_of_beam_mm(beam), self.beam_mm))
     }
 
     /// The sensors of the beams of a machine at `start_mm`, each over its leaves.
-    pub(crate) fn beams(&self, leaves_mm: [&[Range<f64>]; 2], start_mm: f64, start_cycle: u64) -> Vec<Sensor> {
+    pub(crate) fn beams(&self, leaves_mm: &[Vec<Range<f64>>; 2], start_mm: f64, start_cycle: u64) -> Vec<Sensor> {
         let second = self.has_second_beam().then_some((wiring::SECOND_BEAM, self.second_beam_mm));
-        let beam = |((pin, behind_mm), leaves_mm): ((Pin, f64), &[Range<f64>])| {
+        let beam = |((pin, behind_mm), leaves_mm): ((Pin, f64), &Vec<Range<f64>>)| {
             let is_broken = leaves_mm.iter().any(|leaf| leaf.contains(&(start_mm - behind_mm)));
             let last = PinChange { cycle: start_cycle, pin, high: !is_broken };
             Sensor { last, behind_mm, response_s: self.beam_response_ms / 1000.0, changed_s: None }
@@ -194,12 +189,6 @@ impl Machine {
     /// Whether there is a second beam.
     pub fn has_second_beam(&self) -> bool {
         self.second_beam_mm > 0.0
-    }
-
-    /// The stretches over which the sensor reports the beam as broken by these leaves, a
-    /// [`union`](crate::ground::union).
-    pub(crate) fn seen_mm(&self, leaves_mm: Vec<Range<f64>>) -> Vec<Range<f64>> {
-        half_covered(leaves_mm, self.beam_mm)
     }
 
     /// The pin changes of encoder and beam while the machine rolls past the row, in order of time.
@@ -239,11 +228,10 @@ impl Machine {
     /// of the first beam, then those of the second.
     pub fn beam_changes(&self, row: &Row, motion: &Motion, start_cycle: u64) -> Vec<PinChange> {
         let leaves_mm = self.leaves_mm(row);
-        let beams = self.beams(leaves_mm.each_ref().map(Vec::as_slice), motion.start_mm(), 0).into_iter();
         let changes = |(mut beam, leaves_mm): (Sensor, &Vec<Range<f64>>)| {
             beam.changes(leaves_mm, motion, 0.0..f64::INFINITY, start_cycle)
         };
-        beams.zip(&leaves_mm).flat_map(changes).collect()
+        self.beams(&leaves_mm, motion.start_mm(), 0).into_iter().zip(&leaves_mm).flat_map(changes).collect()
     }
 }
 
@@ -313,6 +301,27 @@ pub fn encoder_edge(cycle: u64, from_ticks: i64, to_ticks: i64) -> PinChange {
     PinChange { cycle, pin, high }
 }
 
+/// The firmware's count before the first of these pin changes, which is 0, and after each. `first_levels` are the levels
+/// before.
+pub fn counts(first_levels: &[PinChange], changes: &[PinChange]) -> Vec<i64> {
+    let after = |levels: Channels, change: &PinChange| {
+        let bit = match change.pin {
+            wiring::ENCODER_A => 0b10,
+            wiring::ENCODER_B => 0b01,
+            _ => 0,
+        };
+        if change.high { levels | bit } else { levels & !bit }
+    };
+    let mut levels = first_levels.iter().fold(0, after);
+    let (mut decoder, mut count) = (Quadrature::new(levels), 0);
+    let counted = changes.iter().map(|change| {
+        levels = after(levels, change);
+        count += if let Step::Ticks(ticks) = decoder.step(levels) { i64::from(ticks) } else { 0 };
+        count
+    });
+    [0].into_iter().chain(counted).collect()
+}
+
 /// The cycle of the Uno's clock at a motion's time.
 pub fn cycle_at(start_cycle: u64, time_s: f64) -> u64 {
     start_cycle.saturating_add_signed((time_s * CYCLES_PER_SECOND as f64).round() as i64)
@@ -340,26 +349,9 @@ pub(crate) mod tests {
         ticks - PULSE_TICKS * (hidden(0..pulse) - hidden(pulse..0)) - in_pulse
     }
 
-    /// Counts of a decoder that takes each pair of levels as they come.
+    /// The firmware's count after these changes.
     fn decode(changes: &[PinChange]) -> i64 {
-        const FORWARD: [(bool, bool); 4] = [(false, false), (true, false), (true, true), (false, true)];
-        let phase = |levels| FORWARD.iter().position(|&pair| pair == levels).unwrap();
-        let (mut levels, mut count) = ((false, false), 0);
-        for change in changes {
-            let before = phase(levels);
-            match change.pin {
-                wiring::ENCODER_A => levels.0 = change.high,
-                wiring::ENCODER_B => levels.1 = change.high,
-                _ => continue,
-            }
-            count += match (phase(levels) + 4 - before) % 4 {
-                0 => 0,
-                1 => 1,
-                3 => -1,
-                _ => panic!("both channels changed at once"),
-            };
-        }
-        count
+        counts(&[], changes).last().copied().unwrap()
     }
 
     fn of_pin(changes: &[PinChange], pin: Pin) -> Vec<PinChange> {
@@ -441,8 +433,6 @@ pub(crate) mod tests {
 
     #[test]
     fn the_tool_leaves_the_row_s_line_early_in_its_stroke() {
-        let machine = Machine::default();
-        assert!((machine.line_degrees() - 4.506).abs() < 0.001);
-        assert!((machine.idle_share_of_stroke() - 0.9).abs() < 0.001);
+        assert!((Machine::default().line_degrees() - 4.506).abs() < 0.001);
     }
 }

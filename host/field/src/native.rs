@@ -26,7 +26,6 @@ use control::operate::{state::State, tool};
 use control::settings::Setting;
 use control::units::{Instant, Interval, Position};
 use rig::{Beams, ByExamples, Rig};
-use std::collections::VecDeque;
 use thiserror::Error;
 use uno::{CYCLES_PER_SECOND, Pulse};
 
@@ -49,14 +48,14 @@ const SERVO_FRAME_S: f64 = 0.020;
 /// Cycles in a step of Timer1, whose prescaler is 8.
 const CYCLES_A_STEP: u64 = 8;
 
-/// The decisions refused a setting or the start.
+/// The firmware or its decisions refused a line.
 #[derive(Debug, Error, PartialEq)]
 #[error("the firmware answers `{command}` with `{answer}`")]
 pub struct Refused {
     /// The typed line.
-    command: String,
-    /// The console's answer.
-    answer: String,
+    pub command: String,
+    /// The console's answer, which begins with `error:`.
+    pub answer: String,
 }
 
 /// The servo's line: the pulses for the widths that the loop commands.
@@ -249,7 +248,7 @@ pub fn beams_before(pass: &Pass) -> Beams {
 /// # Errors
 /// If they refuse a setting or the start.
 pub fn weed(pass: &Pass, sensors: &Sensors) -> Result<Weeded, Refused> {
-    run(pass, sensors, |_| ())
+    run(pass, sensors, false, |_| ())
 }
 
 /// The slip that the second beam measures, in thousandths, plant by plant.
@@ -257,12 +256,8 @@ pub fn weed(pass: &Pass, sensors: &Sensors) -> Result<Weeded, Refused> {
 /// # Errors
 /// As [`weed`].
 pub fn slips_permille(pass: &Pass, sensors: &Sensors) -> Result<Vec<i16>, Refused> {
-    let (mut slips, mut tells) = (Vec::new(), false);
-    run(pass, sensors, |weeder| {
-        if !tells {
-            weeder.enable_events(true);
-            tells = true;
-        }
+    let mut slips = Vec::new();
+    run(pass, sensors, true, |weeder| {
         while let Some(event) = weeder.next_event() {
             if let Event::Slip { permille } = event {
                 slips.push(permille);
@@ -272,9 +267,9 @@ pub fn slips_permille(pass: &Pass, sensors: &Sensors) -> Result<Vec<i16>, Refuse
     Ok(slips)
 }
 
-/// Weeds the row. Calls `listen` after each turn.
+/// Weeds the row. Calls `listen` after each turn, with events if `is_told`.
 #[inline(always)]
-fn run(pass: &Pass, sensors: &Sensors, mut listen: impl FnMut(&mut Weeder)) -> Result<Weeded, Refused> {
+fn run(pass: &Pass, sensors: &Sensors, is_told: bool, mut listen: impl FnMut(&mut Weeder)) -> Result<Weeded, Refused> {
     let readings = Readings::new(instant(0), Position::new(0));
     let classifier = Nearest::new(&EXAMPLES[..], Volatile::new());
     let mut weeder: Weeder = Rig::wake_at(classifier, Volatile::new(), readings, beams_before(pass), Cause::PowerOn);
@@ -288,7 +283,19 @@ fn run(pass: &Pass, sensors: &Sensors, mut listen: impl FnMut(&mut Weeder)) -> R
     }
     type_line(&mut weeder, if pass.start == Start::Now { "start now" } else { "start" })?;
 
-    let mut why = Why::new(pass, &mut weeder)?;
+    let is_guarding = weeder.settings().get(Setting::GuardSpacingMm) > 0;
+    if is_guarding || is_told {
+        type_line(&mut weeder, "events on")?;
+    }
+    let mut why = Why {
+        pass,
+        reasons: Reasons::default(),
+        slowest_s: pass.machine.servo.slowest_s() + SERVO_FRAME_S,
+        in_since_s: None,
+        zone: None,
+        is_guarding,
+        guarded: Vec::new(),
+    };
     let orders = weeder.orders();
     let mut line = ServoLine::new(orders.pulse, orders.gap_ms);
     for (turn, Turn { time_s, position, edges }) in (0..=turns(pass, TURN_S)).zip(sensors.turns()) {
@@ -318,27 +325,10 @@ struct Why<'a> {
     zone: Option<((Position, Position), Part)>,
     is_guarding: bool,
     /// The middles of the guarded zones that are still ahead of the tool, or at it.
-    guarded: VecDeque<Position>,
+    guarded: Vec<Position>,
 }
 
-impl<'a> Why<'a> {
-    fn new(pass: &'a Pass, weeder: &mut Weeder) -> Result<Self, Refused> {
-        let is_guarding = weeder.settings().get(Setting::GuardSpacingMm) > 0;
-        if is_guarding {
-            type_line(weeder, "events on")?;
-        }
-        let slowest_s = pass.machine.servo.slowest_s() + SERVO_FRAME_S;
-        Ok(Self {
-            pass,
-            reasons: Reasons::default(),
-            slowest_s,
-            in_since_s: None,
-            zone: None,
-            is_guarding,
-            guarded: VecDeque::new(),
-        })
-    }
-
+impl Why<'_> {
     /// Records the present reason after a turn. Not inlined, which makes the loop faster.
     #[inline(never)]
     fn look(&mut self, weeder: &mut Weeder, is_in: bool, time_s: f64) {
@@ -346,7 +336,7 @@ impl<'a> Why<'a> {
             && let Some(event) = weeder.next_event()
         {
             if let Event::Guarded(middle) = event {
-                self.guarded.push_back(middle);
+                self.guarded.push(middle);
             }
         }
         if !is_in {

@@ -24,15 +24,11 @@ pub enum PlantingError {
     NoRoomForWeeds(usize),
     /// The canopies do not fit into the spacing.
     #[error(
-        "a spacing of {spacing_mm} mm leaves no room for canopies of {canopy_mm} mm: \
-         spacing less its scatter has to exceed the canopy with its scatter"
+        "a spacing of {} mm leaves no room for canopies of {} mm: \
+         spacing less its scatter has to exceed the canopy with its scatter",
+        .0.spacing_mm, .0.canopy_mm
     )]
-    NoRoomForPlants {
-        /// Mean spacing.
-        spacing_mm: f64,
-        /// Mean canopy.
-        canopy_mm: f64,
-    },
+    NoRoomForPlants(Planting),
     /// Nothing was planted.
     #[error(transparent)]
     Row(#[from] Problem),
@@ -91,7 +87,7 @@ impl Planting {
         let tightest_mm = self.spacing_mm - self.spacing_scatter_mm;
         let widest_mm = self.canopy_mm + self.canopy_scatter_mm;
         if tightest_mm <= widest_mm {
-            return Err(PlantingError::NoRoomForPlants { spacing_mm: self.spacing_mm, canopy_mm: self.canopy_mm });
+            return Err(PlantingError::NoRoomForPlants(*self));
         }
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut canopies = Vec::with_capacity(self.plants + self.weeds);

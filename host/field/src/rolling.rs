@@ -9,6 +9,7 @@ use crate::machine::{Machine, Sensor, channels, cycle_at, time_at_s};
 use crate::motion::Motion;
 use crate::row::Canopy;
 use crate::servo::Stroke;
+use crate::sight::half_covered;
 use crate::wiring;
 use std::ops::Range;
 use uno::{Pin, PinChange, Pulse};
@@ -41,7 +42,7 @@ pub struct Rolling {
     /// The speed that the machine keeps or changes to, negative backwards.
     pub target_mm_s: f64,
     /// Net counts of a clean encoder since the beginning.
-    ticks: i64,
+    pub ticks: i64,
     beams: Vec<Sensor>,
     /// The pulses that changed the tool's command.
     pulses: Vec<Pulse>,
@@ -53,9 +54,9 @@ pub struct Rolling {
 impl Rolling {
     /// A standing machine before or in a row.
     pub fn new(machine: Machine, row: Vec<Canopy>, start_mm: f64, start_cycle: u64) -> Self {
-        let leaves_mm = machine.seen_mm(union(row.iter().flat_map(Canopy::blocks_mm).collect()));
+        let leaves_mm = half_covered(union(row.iter().flat_map(Canopy::blocks_mm).collect()), machine.beam_mm);
         Self {
-            beams: machine.beams([&leaves_mm; 2], start_mm, start_cycle),
+            beams: machine.beams(&[leaves_mm.clone(), leaves_mm], start_mm, start_cycle),
             row,
             commands: 0,
             motion: Motion::starting_at(start_mm),
@@ -84,7 +85,8 @@ impl Rolling {
         for beam in &mut self.beams {
             let near_mm =
                 rolled_mm.start - beam.behind_mm - machine.beam_mm..rolled_mm.end - beam.behind_mm + machine.beam_mm;
-            let leaves_mm = machine.seen_mm(union(within(&self.row, &near_mm).flat_map(Canopy::blocks_mm).collect()));
+            let leaves_mm = union(within(&self.row, &near_mm).flat_map(Canopy::blocks_mm).collect());
+            let leaves_mm = half_covered(leaves_mm, machine.beam_mm);
             let reports = beam.changes(&leaves_mm, motion, during_s.clone(), *start_cycle);
             if !(faults.beam_wire_torn && beam.last.pin == wiring::BEAM) {
                 changes.extend(reports);
@@ -147,11 +149,6 @@ impl Rolling {
     /// The tool's angle now; 0 is in the row.
     pub fn degrees(&self) -> f64 {
         self.stroke.degrees(self.now_s())
-    }
-
-    /// Counts of a perfect encoder, net, since the beginning.
-    pub fn ticks(&self) -> i64 {
-        self.ticks
     }
 
     /// Distance of the machine for one count of the encoder, now.

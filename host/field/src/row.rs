@@ -4,7 +4,7 @@
 //! A [`Row`] comes from a list, from a CSV file of measured plants, or from a seed
 //! ([`Planting`](crate::planting::Planting)). Canopies in a row do not overlap: those that touch are one detection of
 //! the beam, and one canopy of the row. Weeds below the beam are not in the row: they are part of the ground that the
-//! tool works. Dust, clods and insects that break the beam may be added ([`Row::with_dust`]).
+//! tool works. Dust, clods and insects that break the beam may be added.
 //!
 //! All positions are millimetres along the ground, from an origin of the row's own.
 
@@ -132,21 +132,13 @@ pub enum Problem {
     /// The width is out of range.
     #[error("width_mm is {0}: it has to be above 0 and at most {MAX_WIDTH_MM} mm")]
     Width(f64),
-    /// Two canopies overlap.
+    /// A canopy overlaps an earlier one.
     #[error(
-        "the {kind} at {position_mm} mm and the {other} at {other_mm} mm overlap: \
-         each has to end before the next begins (plants that have grown together are one line)"
+        "the {} at {} mm and the {} at {} mm overlap: \
+         each has to end before the next begins (plants that have grown together are one line)",
+        .0[0].kind, .0[0].position_mm, .0[1].kind, .0[1].position_mm
     )]
-    Overlap {
-        /// The later canopy.
-        kind: Kind,
-        /// The later canopy's position.
-        position_mm: f64,
-        /// The earlier canopy.
-        other: Kind,
-        /// The earlier canopy's position.
-        other_mm: f64,
-    },
+    Overlap(Box<[Canopy; 2]>),
     /// The row is too long.
     #[error("the row is {} m long: it has to be at most {} m", (.0 / 1000.0).ceil(), MAX_LENGTH_MM / 1000.0)]
     Length(f64),
@@ -162,13 +154,14 @@ const COLUMNS: [&str; 3] = ["position_mm", "width_mm", "kind"];
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
     canopies: Vec<Canopy>,
-    dust_mm: Vec<Range<f64>>,
+    /// The stretches over which dust breaks the beam.
+    pub dust_mm: Vec<Range<f64>>,
     /// The stretches where each beam is broken, if the leaves move between the beams.
-    swayed_mm: Option<[Vec<Range<f64>>; 2]>,
+    pub(crate) swayed_mm: Option<[Vec<Range<f64>>; 2]>,
     /// The crop's stems, if they do not stand in the middle of their canopies.
-    stems: Option<Vec<Stem>>,
+    pub stems: Option<Vec<Stem>>,
     /// Its ends, if they are known.
-    ground_mm: Option<Range<f64>>,
+    pub(crate) ground_mm: Option<Range<f64>>,
 }
 
 impl Row {
@@ -191,12 +184,7 @@ impl Row {
             let ((_, before), (mark, canopy)) = (&pair[0], &pair[1]);
             let length_mm = canopy.position_mm - canopies[0].1.position_mm;
             let problem = if before.span_mm().end >= canopy.span_mm().start {
-                Problem::Overlap {
-                    kind: canopy.kind,
-                    position_mm: canopy.position_mm,
-                    other: before.kind,
-                    other_mm: before.position_mm,
-                }
+                Problem::Overlap(Box::new([canopy.clone(), before.clone()]))
             } else if length_mm > MAX_LENGTH_MM {
                 Problem::Length(length_mm)
             } else {
@@ -204,33 +192,12 @@ impl Row {
             };
             return Err((*mark, problem));
         }
-        Ok(Self {
-            canopies: canopies.into_iter().map(|(_, canopy)| canopy).collect(),
-            dust_mm: Vec::new(),
-            swayed_mm: None,
-            stems: None,
-            ground_mm: None,
-        })
+        Ok(Self::of(canopies.into_iter().map(|(_, canopy)| canopy).collect(), None))
     }
 
-    /// The same row, with the ends of this ground.
-    pub fn on_ground(self, ground_mm: Range<f64>) -> Self {
-        Self { ground_mm: Some(ground_mm), ..self }
-    }
-
-    /// The same row with dust that breaks the beam over these stretches.
-    pub fn with_dust(self, dust_mm: Vec<Range<f64>>) -> Self {
-        Self { dust_mm, ..self }
-    }
-
-    /// The same row, with leaves that break each beam over other stretches, because they move.
-    pub(crate) fn swayed(self, swayed_mm: [Vec<Range<f64>>; 2]) -> Self {
-        Self { swayed_mm: Some(swayed_mm), ..self }
-    }
-
-    /// The same row, with these stems.
-    pub fn with_stems(self, stems: Vec<Stem>) -> Self {
-        Self { stems: Some(stems), ..self }
+    /// A row of these canopies alone.
+    fn of(canopies: Vec<Canopy>, ground_mm: Option<Range<f64>>) -> Self {
+        Self { canopies, dust_mm: Vec::new(), swayed_mm: None, stems: None, ground_mm }
     }
 
     /// The stems of its plants. If none are known, one stands in the middle of each canopy.
@@ -257,23 +224,12 @@ impl Row {
         let end_mm = self.span_mm().start + length_mm;
         let canopies: Vec<Canopy> =
             self.canopies.iter().filter(|canopy| canopy.span_mm().end < end_mm).cloned().collect();
-        (!canopies.is_empty()).then_some(Self {
-            canopies,
-            dust_mm: Vec::new(),
-            swayed_mm: None,
-            stems: None,
-            ground_mm: Some(self.span_mm().start..end_mm),
-        })
+        (!canopies.is_empty()).then(|| Self::of(canopies, Some(self.span_mm().start..end_mm)))
     }
 
     /// Everything that stands in the row, by position.
     pub fn canopies(&self) -> &[Canopy] {
         &self.canopies
-    }
-
-    /// The stretches over which dust breaks the beam.
-    pub fn dust_mm(&self) -> &[Range<f64>] {
-        &self.dust_mm
     }
 
     /// The crop plants, by position.

@@ -143,10 +143,12 @@ impl Stand {
         for leaves_mm in &mut swayed {
             leaves_mm.extend(canopies[first_weed..].iter().flat_map(Canopy::blocks_mm));
         }
+        let mut row = Row::new(grown_together(canopies))?;
+        row.dust_mm = dust_mm;
+        row.swayed_mm = (crop.sway_mm > 0.0).then_some(swayed);
+        row.ground_mm = Some(span_mm.clone());
         // The tools' effect on the stems is counted by itself.
-        let row = Row::new(grown_together(canopies))?.with_dust(dust_mm).on_ground(span_mm.clone());
-        let row = row.with_stems(Vec::new());
-        let row = if crop.sway_mm > 0.0 { row.swayed(swayed) } else { row };
+        row.stems = Some(Vec::new());
         // The next row is planted separately: it has the same planting positions, and its own random numbers.
         let next_to = |place: u32| {
             let at_mm = sown(&mut sown_next_rng, (f64::from(place) + 0.5) * spacing_mm)

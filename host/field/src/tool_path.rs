@@ -20,8 +20,9 @@ use crate::motion::Motion;
 use crate::row::Stem;
 use crate::servo::Stroke;
 use crate::stand::{Stand, Weed};
+use derive_more::AddAssign;
 use serde::{Deserialize, Serialize};
-use std::ops::{AddAssign, Range};
+use std::ops::Range;
 use uno::Pulse;
 
 /// A sweep that enters a zone by less than this only touches it.
@@ -31,7 +32,7 @@ const TOUCH_MM: f64 = 1e-6;
 const SAMPLE_S: f64 = 0.000_5;
 
 /// Counts of weeds. `u64`, because there are about ten a plant, and many plants in a study.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, AddAssign, Serialize, Deserialize)]
 pub struct WeedCount {
     /// Before weeding.
     pub before: u64,
@@ -46,15 +47,8 @@ impl WeedCount {
     }
 }
 
-impl AddAssign for WeedCount {
-    fn add_assign(&mut self, other: Self) {
-        self.before += other.before;
-        self.after += other.after;
-    }
-}
-
 /// The effect of the tools on a stand.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, AddAssign, Serialize, Deserialize)]
 pub struct Effect {
     /// Crop plants.
     pub plants: u32,
@@ -89,26 +83,6 @@ impl Effect {
     }
 }
 
-impl AddAssign for Effect {
-    fn add_assign(&mut self, other: Self) {
-        self.plants += other.plants;
-        self.damaged += other.damaged;
-        self.unseen += other.unseen;
-        self.all_unseen += other.all_unseen;
-        self.swept += other.swept;
-        self.neighbours += other.neighbours;
-        self.in_row += other.in_row;
-        self.in_plot += other.in_plot;
-        self.counted += other.counted;
-    }
-}
-
-/// The tools of a machine, with its motion.
-struct Tools<'a> {
-    mechanism: &'a Mechanism,
-    swinging: Swinging<'a>,
-}
-
 /// The tool in the row, on its way.
 pub(crate) struct Swinging<'a> {
     pub machine: &'a Machine,
@@ -134,22 +108,22 @@ pub fn effect(
     let stroke = machine.servo.stroke(&machine.servo.commands(pulses), start_cycle);
     let (motion, steering) = drive;
     let swinging = Swinging { machine, motion, steering, stroke: &stroke };
-    let tools = Tools { mechanism, swinging };
     let all_unseen = stand.stems.iter().filter(|stem| !stem.is_seen).count() as u32;
     let mut effect = Effect { plants: stand.stems.len() as u32, all_unseen, ..Effect::default() };
     for stem in &stand.stems {
-        if tools.swinging.damages(stem) {
+        if swinging.damages(stem) {
             effect.damaged += 1;
             effect.unseen += u32::from(!stem.is_seen);
-        } else if tools.sweep_cuts(stem) {
+        } else if sweep_cuts(stem, mechanism, steering) {
             effect.swept += 1;
         }
     }
-    effect.neighbours =
-        stand.neighbours.iter().filter(|stem| tools.swinging.reaches(stem) && tools.swinging.damages(stem)).count()
-            as u32;
+    let is_cut = |stem: &&Stem| swinging.reaches(stem) && swinging.damages(stem);
+    effect.neighbours = stand.neighbours.iter().filter(is_cut).count() as u32;
     for weed in &stand.weeds {
-        let counted = WeedCount { before: 1, after: u64::from(!tools.remove(weed)) };
+        let across_mm = weed.across_mm - steering.across_mm(weed.along_mm);
+        let is_removed = mechanism.swept_mm().contains(&across_mm.abs()) || swinging.removes(weed);
+        let counted = WeedCount { before: 1, after: u64::from(!is_removed) };
         effect.in_plot += counted;
         if stand.counted_mm.contains(&weed.along_mm) {
             effect.counted += counted;
@@ -161,30 +135,17 @@ pub fn effect(
     effect
 }
 
-impl Tools<'_> {
-    /// Distance of a position from the machine's middle, across the row.
-    fn across_mm(&self, place_mm: f64, across_mm: f64) -> f64 {
-        across_mm - self.swinging.steering.across_mm(place_mm)
-    }
-
-    /// Whether a sweep passes through the zone round a stem.
-    fn sweep_cuts(&self, stem: &Stem) -> bool {
-        let swept = self.mechanism.swept_mm();
-        let Stem { along_mm, across_mm, protected_mm, .. } = *stem;
-        let steps = protected_mm.ceil() as i32;
-        (-steps..=steps).any(|step| {
-            let beside_mm = protected_mm * f64::from(step) / f64::from(steps);
-            let chord_mm = stem.half_chord_mm(beside_mm);
-            let across_mm = self.across_mm(along_mm + beside_mm, across_mm).abs();
-            // Touching is no cut: sweeps may run along the zones.
-            across_mm + chord_mm > swept.start + TOUCH_MM && across_mm - chord_mm < swept.end - TOUCH_MM
-        })
-    }
-
-    fn remove(&self, weed: &Weed) -> bool {
-        let across_mm = self.across_mm(weed.along_mm, weed.across_mm);
-        self.mechanism.swept_mm().contains(&across_mm.abs()) || self.swinging.removes(weed)
-    }
+/// Whether a sweep passes through the zone round a stem.
+fn sweep_cuts(stem: &Stem, mechanism: &Mechanism, steering: &Steering) -> bool {
+    let swept = mechanism.swept_mm();
+    let steps = stem.protected_mm.ceil() as i32;
+    (-steps..=steps).any(|step| {
+        let beside_mm = stem.protected_mm * f64::from(step) / f64::from(steps);
+        let chord_mm = stem.half_chord_mm(beside_mm);
+        let across_mm = (stem.across_mm - steering.across_mm(stem.along_mm + beside_mm)).abs();
+        // Touching is no cut: sweeps may run along the zones.
+        across_mm + chord_mm > swept.start + TOUCH_MM && across_mm - chord_mm < swept.end - TOUCH_MM
+    })
 }
 
 impl Swinging<'_> {
@@ -331,8 +292,8 @@ pub(crate) mod tests {
         // The zone ends 10 mm from the sweeps.
         let cut = |within_mm: f64| {
             let seeds = (0..100).map(|seed| {
-                let steering =
-                    Steering::within(within_mm, -1000.0..3000.0, &mut rand_chacha::ChaCha8Rng::seed_from_u64(seed));
+                let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+                let steering = Steering::within(within_mm, 0.0, -1000.0..3000.0, &mut rng);
                 steered(&stand(), &steering, 800.0, 1100.0).swept
             });
             seeds.sum::<u32>()

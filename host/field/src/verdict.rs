@@ -201,7 +201,6 @@ pub fn judge(
         let mut passings = motion.passings(place_mm + machine.beam_to_tool_mm);
         passings.any(|passing| stroke.degrees(passing.time_s) < machine.line_degrees())
     };
-    let swings = Swing::all(&commands, motion, start_cycle);
 
     let mut plants: Vec<PlantOutcome> =
         row.plants().map(|plant| plant_outcome(plant, &closed, &over_zone, machine, timing)).collect();
@@ -214,22 +213,22 @@ pub fn judge(
         }
     }
     let mut idle_swings = 0;
-    for swing in &swings {
-        let passed = machine.worked_mm(motion, &swing.during_s);
+    for swing in Swing::all(&commands, start_cycle) {
+        let during_s = swing.out_s.unwrap_or(0.0)..swing.in_s.unwrap_or(whole_s.end);
+        let worked = machine.worked_mm(motion, &during_s);
         // Plants stand in ascending order, and apart.
-        let first = plants.partition_point(|plant| plant.plant.span_mm().end <= passed.start);
-        let behind = plants.partition_point(|plant| plant.plant.span_mm().start < passed.end);
-        for plant in plants.iter_mut().take(behind).skip(first) {
-            plant.swings += 1;
+        let first = plants.partition_point(|plant| plant.plant.span_mm().end <= worked.start);
+        let behind = plants.partition_point(|plant| plant.plant.span_mm().start < worked.end);
+        let passed = &mut plants[first..behind];
+        passed.iter_mut().for_each(|plant| plant.swings += 1);
+        idle_swings += usize::from(passed.is_empty() && swing.out_s.is_some());
+        if let Some(first) = passed.first_mut() {
+            let out_mm = timing.window_mm(&first.plant).start;
+            first.out_error_ticks = swing.out_s.and_then(|time_s| late_ticks(time_s, out_mm, timing.lead_out_ms));
         }
-        if let (true, Some(last)) = (first < behind, behind.checked_sub(1)) {
-            let [first_mm, last_mm] = [first, last].map(|plant| timing.window_mm(&plants[plant].plant));
-            plants[first].out_error_ticks =
-                swing.out_s.and_then(|time_s| late_ticks(time_s, first_mm.start, timing.lead_out_ms));
-            plants[last].in_error_ticks =
-                swing.in_s.and_then(|time_s| late_ticks(time_s, last_mm.end, timing.lead_in_ms));
-        } else if swing.out_s.is_some() {
-            idle_swings += 1;
+        if let Some(last) = passed.last_mut() {
+            let in_mm = timing.window_mm(&last.plant).end;
+            last.in_error_ticks = swing.in_s.and_then(|time_s| late_ticks(time_s, in_mm, timing.lead_in_ms));
         }
     }
 
@@ -262,10 +261,7 @@ fn plant_outcome(
         let inside_mm = level.inside_mm(&kept, timing.stem_zone_mm);
         let zone = kept.start + inside_mm..kept.end - inside_mm;
         let (out_mm, in_mm) = swings_beside(ground, &zone, plant.position_mm);
-        let lesser = |clearance_mm: Option<f64>, now_mm: Option<f64>| match (clearance_mm, now_mm) {
-            (Some(clearance_mm), Some(now_mm)) => Some(clearance_mm.min(now_mm)),
-            (clearance_mm, now_mm) => clearance_mm.or(now_mm),
-        };
+        let lesser = |clearance_mm, now_mm| [clearance_mm, now_mm].into_iter().flatten().reduce(f64::min);
         clearance_before_mm = lesser(clearance_before_mm, out_mm.map(|out_mm| zone.start - out_mm));
         clearance_behind_mm = lesser(clearance_behind_mm, in_mm.map(|in_mm| in_mm - zone.end));
     }
@@ -359,22 +355,11 @@ mod tests {
         Motion::steady(-500.0, 1000.0, mm_s(2.5), 3000.0)
     }
 
-    /// Frames 20 ms apart. A frame restarts where the width changes: out at power-up, in at the first position of the
-    /// machine, out at the second, and so on.
+    /// The first pulse of each width: out at power-up, in at the first position of the machine, out at the second, and so on.
     fn pulses(motion: &Motion, changes_mm: &[f64]) -> Vec<Pulse> {
-        let times_s = changes_mm.iter().map(|&mm| motion.passings(mm).next().unwrap().time_s);
-        let mut edges = vec![0];
-        edges.extend(times_s.map(|time_s| cycle_at(START_CYCLE, time_s)));
-        edges.push(cycle_at(START_CYCLE, motion.duration_s()));
-        let mut pulses = Vec::new();
-        for (index, edge) in edges.windows(2).enumerate() {
-            let width_us = if index % 2 == 0 { 2000 } else { 1500 };
-            for rise in (edge[0]..edge[1]).step_by(CYCLES_PER_SECOND as usize / 50) {
-                let fall = rise + width_us * CYCLES_PER_SECOND / 1_000_000;
-                pulses.push(Pulse { rise, fall });
-            }
-        }
-        pulses
+        let rises = changes_mm.iter().map(|&mm| cycle_at(START_CYCLE, motion.passings(mm).next().unwrap().time_s));
+        let widths = [2000, 1500].map(|us| us * CYCLES_PER_SECOND / 1_000_000).into_iter().cycle();
+        [0].into_iter().chain(rises).zip(widths).map(|(rise, width)| Pulse { rise, fall: rise + width }).collect()
     }
 
     /// Positions of the machine at which the swings of [`row`] should be commanded, with these leads.

@@ -111,7 +111,7 @@ fn weed(arguments: &Arguments, row: Row, folder: Option<&OutFolder>, vcd: Option
     Size::read(&elf)?;
     if !arguments.json {
         let manner = if arguments.paper { ", swings as in the paper" } else { "" };
-        let introduction = report::introduction(&pass.row, &pass.machine, &pass.motion);
+        let introduction = report::introduction(&pass);
         say!("{introduction} at {} km/h{manner}", course.speed)?;
         say!("Field {}, {}", in_a_line(arguments.field()), course.origin())?;
     }

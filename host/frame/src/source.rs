@@ -41,7 +41,7 @@ fn named(name: OsString) -> Result<OsString, String> {
 /// If it is neither a preset nor a valid file.
 pub fn field(preset_or_file: &str) -> Result<Conditions, FileError> {
     let conditions = Conditions::load(preset_or_file)?;
-    conditions.warnings().iter().for_each(|warning| tell!("Warning: {warning}"));
+    conditions.warning().iter().for_each(|warning| tell!("Warning: {warning}"));
     Ok(conditions)
 }
 

@@ -14,7 +14,7 @@ use control::{
         nearest::Nearest,
     },
     measure::{quadrature::Odometer, readings::Readings, reset::Cause},
-    memory::Volatile,
+    memory::{SIZE, Volatile},
     operate::{servo, state::State, tool::Reason},
     say::{Console, LINE, command::LineBuffer},
     settings::{Setting, Settings},
@@ -299,7 +299,7 @@ impl Machine for Decisions {
     }
 
     fn examples(&self) -> Vec<Listed> {
-        from_the_field(&Nearest::new(&EXAMPLES[..], Volatile::holding(self.eeprom.examples())))
+        field_examples(self.eeprom.examples())
     }
 
     fn spoil(&mut self, address: usize, byte: u8) -> Checked {
@@ -315,8 +315,9 @@ impl Machine for Decisions {
     }
 }
 
-/// The field examples of a classifier.
-pub fn from_the_field(classifier: &impl Classifier) -> Vec<Listed> {
+/// The field examples in the examples' half of an EEPROM.
+pub fn field_examples(bytes: [u8; SIZE]) -> Vec<Listed> {
+    let classifier = Nearest::new(&EXAMPLES[..], Volatile::holding(bytes));
     let all = std::iter::successors(classifier.listed(0), |&(_, next)| classifier.listed(next));
     all.map(|(listed, _)| listed).filter(|listed| listed.from_field).collect()
 }

@@ -60,8 +60,8 @@ pub struct Drive<M> {
     current: String,
     /// The lines that it wrote in the last turn.
     written: Vec<String>,
-    /// The alarms, warnings and greetings since [`take_events`](Self::take_events).
-    events: Vec<String>,
+    /// The alarms, warnings and greetings that the machine wrote, until the caller takes them.
+    pub events: Vec<String>,
     /// The settings of the last acknowledged save, and those of a save in progress.
     saved: Option<Settings>,
     saving: Option<Settings>,
@@ -110,7 +110,8 @@ pub struct Drive<M> {
     /// Turns in which the tool was out for a plant that the model does not know.
     unexplained_turns: u32,
     turns: u64,
-    steady_swings: u32,
+    /// Swings out at a steady speed, each for another keep-out zone.
+    pub steady_swings: u32,
     /// Ticks rolled in this row, and with the tool in the row.
     rolled: f64,
     weeded: f64,
@@ -362,24 +363,9 @@ impl<M: Machine> Drive<M> {
         }
     }
 
-    /// The machine's state.
-    pub fn state(&self) -> State {
-        self.machine.state()
-    }
-
-    /// Whether the tool is out of the row.
-    pub fn tool_out(&self) -> bool {
-        self.machine.tool_out()
-    }
-
-    /// Swings out at a steady speed, each for another keep-out zone.
-    pub fn steady_swings(&self) -> u32 {
-        self.steady_swings
-    }
-
-    /// The settings in use.
-    pub fn settings(&self) -> &Settings {
-        self.machine.settings()
+    /// The machine.
+    pub fn machine(&self) -> &M {
+        &self.machine
     }
 
     /// The real position in ticks: 0 in the headland of the row.
@@ -398,11 +384,6 @@ impl<M: Machine> Drive<M> {
         let mut score = Score { metres, weeded_metres, ..Score::default() };
         self.stand.iter().for_each(|stand| stand.add_to(&mut score));
         score
-    }
-
-    /// Takes the alarms, warnings and greetings that the machine wrote.
-    pub fn take_events(&mut self) -> Vec<String> {
-        std::mem::take(&mut self.events)
     }
 
     fn ticks(&self, setting: Setting) -> i64 {

@@ -45,7 +45,7 @@ fn blur(stretches: &[Stretch]) -> i64 {
 }
 
 /// The ground as the beam has seen it.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Model {
     /// Ground behind this position is unknown.
     known_from: i64,
@@ -81,23 +81,7 @@ pub struct Model {
 impl Model {
     /// A model that knows only the beam's level.
     pub fn new(place: i64, broken: bool) -> Self {
-        let mut model = Self {
-            known_from: place,
-            begin: place,
-            frontier: place,
-            broken,
-            is_growing: false,
-            may_be_broken_at_frontier: false,
-            stretches: Vec::new(),
-            guarded: Vec::new(),
-            merge_gaps: Vec::new(),
-            stem_zones: Vec::new(),
-            narrow: 0,
-            slack: 0,
-            resolution_slack: 0,
-            is_shifted: false,
-            may_have_forgotten: false,
-        };
+        let mut model = Self { known_from: place, begin: place, frontier: place, broken, ..Self::default() };
         model.touch(0);
         model
     }
@@ -327,15 +311,15 @@ impl Model {
     pub fn has_canopy_near(&self, place: i64, reach: i64) -> bool {
         let (before, behind) =
             self.stretches.split_at(self.stretches.partition_point(|stretch| stretch.leading <= place));
-        let next = behind.first().copied().unwrap_or(Stretch::closed(self.frontier, self.frontier, 0));
-        if before.last().is_some_and(|before| self.may_be_one(before, &next)) {
+        let at_frontier = Stretch::closed(self.frontier, self.frontier, 0);
+        let next = behind.first().unwrap_or(&at_frontier);
+        if before.last().is_some_and(|before| self.may_be_one(before, next)) {
             return true;
         }
         let is_near = |stretch: &Stretch| {
             let reach = reach + self.slack + 2 * stretch.blur;
             stretch.leading - reach <= place && place <= stretch.trailing + reach
         };
-        let at_frontier = Stretch::closed(self.frontier, self.frontier, 0);
         self.may_be_broken_at_frontier && is_near(&at_frontier)
             || self.stretches.iter().chain(&self.guarded).any(is_near)
     }

@@ -200,7 +200,7 @@ impl Simulation {
             "isClear": degrees >= machine.clear_degrees(),
             "isWeeding": across_mm < machine.tool_width_mm / 2.0,
             "isBroken": rolling.is_beam_broken(),
-            "ticks": rolling.ticks(),
+            "ticks": rolling.ticks,
             "groundMmATick": rolling.ground_mm_a_tick(),
             "commands": rolling.commands,
         });

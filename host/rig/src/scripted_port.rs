@@ -5,8 +5,7 @@ use control::ground::nearest::Nearest;
 use control::memory::Volatile;
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread;
 use std::time::Duration;
 
@@ -41,18 +40,13 @@ impl<F: FnMut(Option<&str>) -> Option<Vec<u8>>> Write for ScriptedPort<F> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         for &byte in bytes {
             match byte {
-                b'\n' => {}
-                0x08 => {
-                    self.typed.pop();
-                    continue;
+                b'\n' => {
+                    let line = String::from_utf8(std::mem::take(&mut self.typed)).map_err(io::Error::other)?;
+                    self.to_read.extend((self.script)(Some(&line)).unwrap_or_default());
                 }
-                _ => {
-                    self.typed.push(byte);
-                    continue;
-                }
+                0x08 => _ = self.typed.pop(),
+                _ => self.typed.push(byte),
             }
-            let line = String::from_utf8(std::mem::take(&mut self.typed)).map_err(io::Error::other)?;
-            self.to_read.extend((self.script)(Some(&line)).unwrap_or_default());
         }
         Ok(bytes.len())
     }
@@ -66,11 +60,14 @@ impl<F: FnMut(Option<&str>) -> Option<Vec<u8>>> Write for ScriptedPort<F> {
 ///
 /// It does not answer `silence`. It accepts every change of its examples.
 #[derive(Clone, Default)]
-pub struct ScriptedBoard {
-    is_there: Arc<AtomicBool>,
+pub struct ScriptedBoard(Arc<Mutex<State>>);
+
+#[derive(Default)]
+struct State {
+    is_there: bool,
     /// Output that no command requests, sent at the next read.
-    says: Arc<Mutex<Vec<u8>>>,
-    typed: Arc<Mutex<Vec<String>>>,
+    says: Vec<u8>,
+    typed: Vec<String>,
 }
 
 impl ScriptedBoard {
@@ -81,24 +78,27 @@ impl ScriptedBoard {
         board
     }
 
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.0.lock().expect("no test has panicked")
+    }
+
     /// Plugs it in, or out.
     pub fn plug(&self, is_there: bool) {
-        self.is_there.store(is_there, Ordering::Relaxed);
+        self.state().is_there = is_there;
     }
 
     /// Sends bytes that no command has requested.
     pub fn say(&self, bytes: &[u8]) {
-        self.says.lock().expect("no test has panicked").extend(bytes);
+        self.state().says.extend(bytes);
     }
 
     /// The typed lines, except those that only ask what the board is, has and does.
     pub fn typed(&self) -> Vec<String> {
-        self.typed.lock().expect("no test has panicked").clone()
+        self.state().typed.clone()
     }
 
     /// A port to the board, which restarts at each opening; `None` while it is unplugged.
     pub fn open(&self) -> Option<impl Read + Write + use<>> {
-        let is_there = |board: &Self| board.is_there.load(Ordering::Relaxed);
         let board = self.clone();
         let mut rig = Rig::new(Nearest::new(&[][..], Volatile::new()));
         let mut answer = move |line: &str| {
@@ -111,17 +111,12 @@ impl ScriptedBoard {
             }
         };
         let script = move |line: Option<&str>| {
-            let said = line.map_or_else(
-                || std::mem::take(&mut *board.says.lock().ok()?).into(),
-                |line| {
-                    if !["", "version", "get", "status", "examples"].contains(&line) {
-                        board.typed.lock().ok()?.push(line.to_owned());
-                    }
-                    Some(answer(line))
-                },
-            );
-            said.filter(|_| is_there(&board))
+            let mut state = board.state();
+            let asks = |line| ["", "version", "get", "status", "examples"].contains(&line);
+            state.typed.extend(line.filter(|line| !asks(line)).map(str::to_owned));
+            let said = line.map_or_else(|| std::mem::take(&mut state.says), &mut answer);
+            state.is_there.then_some(said)
         };
-        is_there(self).then(|| ScriptedPort::new(script))
+        self.state().is_there.then(|| ScriptedPort::new(script))
     }
 }

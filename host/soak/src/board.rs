@@ -6,10 +6,9 @@
 //! output of the restarted firmware.
 
 use control::alarm::Alarm;
-use control::ground::examples::EXAMPLES;
-use control::ground::{class::Listed, nearest::Nearest};
+use control::ground::class::Listed;
 use control::measure::reset::Cause;
-use control::memory::{SIZE, Volatile};
+use control::memory::SIZE;
 use control::operate::state::State;
 use control::say::command::Action;
 use control::settings::{Setting, Settings};
@@ -18,7 +17,7 @@ use field::wiring;
 use link::Values;
 use logbook::follower::InUse;
 use model_test::Failure;
-use model_test::decisions::from_the_field;
+use model_test::decisions::field_examples;
 use model_test::drive::is_end;
 use model_test::machine::{Attended, Checked, Machine, World};
 use model_test::run::Beginning;
@@ -358,7 +357,7 @@ impl Machine for Board {
     fn examples(&self) -> Vec<Listed> {
         let mut bytes = [0; SIZE];
         bytes.copy_from_slice(&self.uno.eeprom()[SIZE..]);
-        from_the_field(&Nearest::new(&EXAMPLES[..], Volatile::holding(bytes)))
+        field_examples(bytes)
     }
 
     fn spoil(&mut self, address: usize, byte: u8) -> Checked {

@@ -234,7 +234,7 @@ impl<M: Machine> Field<M> {
         self.tally.seconds = self.drive.time_s();
         if let Err(Failure::Fail(failure) | Failure::Reject(failure)) = outcome {
             let (fault, fault_s) = self.last_fault;
-            let (row, state, time_s) = (self.tally.rows, self.drive.state(), self.drive.time_s());
+            let (row, state, time_s) = (self.tally.rows, self.drive.machine().state(), self.drive.time_s());
             self.tally.violations.push(format!(
                 "at {time_s:.3} s: row {row}, in {state:?}, {:.3} s after {fault}: {failure}",
                 time_s - fault_s
@@ -255,7 +255,8 @@ impl<M: Machine> Field<M> {
         self.set_up()?;
         self.row_end = run.period();
         while self.drive.position() < self.row_end && self.drive.time_s() < last_s {
-            let most = most_slip(self.drive.settings().get(Setting::MarginMm).into(), machine.beam_to_tool_mm);
+            let most =
+                most_slip(self.drive.machine().settings().get(Setting::MarginMm).into(), machine.beam_to_tool_mm);
             let permille = (1000.0 * self.rng.random_range(-most..=most)) as i32;
             self.execute(&Step::Slip { permille })?;
             let (mm_s, leg_s) = self.draw_leg();
@@ -293,7 +294,7 @@ impl<M: Machine> Field<M> {
     /// Executes a step. Counts the events that the machine wrote.
     fn execute(&mut self, step: &Step) -> Checked {
         let outcome = self.drive.execute(step);
-        for line in self.drive.take_events() {
+        for line in std::mem::take(&mut self.drive.events) {
             self.tally.hear(&line);
         }
         outcome
@@ -305,7 +306,7 @@ impl<M: Machine> Field<M> {
 
     /// Whether the firmware has the settings of the present machine.
     fn is_set_up(&self) -> bool {
-        let settings = self.drive.settings();
+        let settings = self.drive.machine().settings();
         self.typed.iter().all(|&(setting, value)| settings.get(setting) == value)
     }
 
@@ -327,11 +328,11 @@ impl<M: Machine> Field<M> {
 
     /// The operator clears a latched alarm, and starts.
     fn start_again(&mut self) -> Checked {
-        if self.drive.state() == State::Work {
+        if self.drive.machine().state() == State::Work {
             return Ok(());
         }
         self.type_in(&["clear", "start"])?;
-        if self.drive.state() == State::Hold {
+        if self.drive.machine().state() == State::Hold {
             Err(Failure::fail("the machine does not start on command"))
         } else {
             Ok(())

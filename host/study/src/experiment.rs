@@ -234,7 +234,7 @@ impl Experiment {
         let fastest = plots.reduce(|a, b| if b.1.speed_km_h > a.1.speed_km_h { b } else { a });
         let Some((number, plot)) = fastest else { return Ok(None) };
         let (stand, _, mut pass) = self.grow((number, &plot), 0)?;
-        pass.row = pass.row.with_stems(stand.stems.clone());
+        pass.row.stems = Some(stand.stems.clone());
         let weeded = weed(&pass, &sensors(&pass), &stand, Treatment::Firmware, engine)?;
         let Pass { row, machine, motion, timing, .. } = &pass;
         let judgement = judge(row, machine, motion, *timing, &weeded.pulses, weeded.start_cycle);

@@ -145,9 +145,8 @@ impl Sweep {
     ///
     /// # Errors
     /// If an axis has an invalid value.
-    pub fn warnings(&self) -> Result<Vec<String>> {
-        let warnings = self.places()?.into_iter().map(|(_, _, experiment)| experiment.conditions.warnings());
-        Ok(warnings.into_iter().find(|warnings| !warnings.is_empty()).unwrap_or_default())
+    pub fn warning(&self) -> Result<Option<String>> {
+        Ok(self.places()?.iter().find_map(|(_, _, experiment)| experiment.conditions.warning()))
     }
 
     /// Weeds a plot at each of a shard's points.

@@ -133,25 +133,22 @@ struct Run {
 impl Run {
     /// An attribute that takes these values at these shares of the row.
     fn value(&self, attribute: &str, frames: &[(f64, String)], mode: &str) -> Animate {
-        let mut animation = Animate::new().set("attributeName", attribute).set("calcMode", mode);
-        self.schedule(&mut animation, frames);
-        animation
+        self.scheduled(Animate::new().set("attributeName", attribute).set("calcMode", mode), frames)
     }
 
     /// The animation of a part's position.
     fn transform(&self, kind: &str, frames: &[(f64, String)]) -> AnimateTransform {
-        let mut animation = AnimateTransform::new().set("attributeName", "transform").set("type", kind);
-        self.schedule(&mut animation, frames);
-        animation
+        self.scheduled(AnimateTransform::new().set("attributeName", "transform").set("type", kind), frames)
     }
 
-    fn schedule(&self, animation: &mut impl Node, frames: &[(f64, String)]) {
+    fn scheduled<Animation: Node>(&self, mut animation: Animation, frames: &[(f64, String)]) -> Animation {
         let times: Vec<String> = frames.iter().map(|(share, _)| format!("{share:.4}")).collect();
         let values: Vec<&str> = frames.iter().map(|(_, value)| value.as_str()).collect();
         animation.assign("keyTimes", times.join(";"));
         animation.assign("values", values.join(";"));
         animation.assign("dur", format!("{:.1}s", self.seconds));
         animation.assign("repeatCount", "indefinite");
+        animation
     }
 }
 
@@ -172,10 +169,14 @@ mod tests {
     use super::*;
     use crate::report::tests::ruined_row;
 
+    fn drawn(arm: Arm) -> String {
+        let (pass, outcome) = ruined_row();
+        draw(&pass.row, &Machine { arm, ..pass.machine }, &outcome.judgement, 500.0).to_string()
+    }
+
     #[test]
     fn the_tool_swings_across_the_row_as_it_did_and_a_damaged_plant_is_red() {
-        let (pass, outcome) = ruined_row();
-        let drawn = draw(&pass.row, &pass.machine, &outcome.judgement, 500.0).to_string();
+        let drawn = drawn(Arm::Pendulum);
         assert_eq!(drawn.matches(WRONG).count(), 2);
         let (_, blade) = drawn.split_once("type=\"translate\"").unwrap();
         let values = blade.split("values=\"").nth(1).unwrap().split('"').next().unwrap();
@@ -186,17 +187,14 @@ mod tests {
 
     #[test]
     fn a_trailing_arm_carries_the_tool_forward_from_a_pivot_ahead_of_it() {
-        let (pass, outcome) = ruined_row();
-        let machine = Machine { arm: Arm::Trailing, ..pass.machine };
-        let drawn = draw(&pass.row, &machine, &outcome.judgement, 500.0).to_string();
+        let drawn = drawn(Arm::Trailing);
         // 102.5 mm forward.
         assert!(drawn.contains("values=\"36.9 -89.1;"), "{drawn}");
     }
 
     #[test]
     fn every_animation_runs_over_the_whole_row_and_never_back() {
-        let (pass, outcome) = ruined_row();
-        let drawn = draw(&pass.row, &pass.machine, &outcome.judgement, 500.0).to_string();
+        let drawn = drawn(Arm::Pendulum);
         let mut found = 0;
         for times in drawn.split("keyTimes=\"").skip(1).map(|rest| rest.split('"').next().unwrap()) {
             let times: Vec<f64> = times.split(';').map(|time| time.parse().unwrap()).collect();

@@ -5,6 +5,7 @@
 //! uses the virtual Uno's clock, so the same commands always come at the same cycles. [`UnoPort`] makes a virtual Uno a
 //! port of the link.
 
+use field::native::Refused;
 use link::{Counts, LineReader};
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
@@ -21,13 +22,8 @@ pub enum ConsoleError {
     #[error(transparent)]
     Uno(#[from] UnoError),
     /// The firmware refused.
-    #[error("the firmware answers `{command}` with `{answer}`")]
-    Refused {
-        /// The command.
-        command: String,
-        /// The line that begins with `error:`.
-        answer: String,
-    },
+    #[error(transparent)]
+    Refused(#[from] Refused),
     /// The firmware went silent.
     #[error("the firmware does not finish its answer to `{command}`: it sent {received:?}")]
     Silent {
@@ -68,7 +64,7 @@ pub fn ask(uno: &mut Uno, command: &str) -> Result<Vec<String>, ConsoleError> {
                 return Ok(answer);
             }
             if line.starts_with("error:") {
-                return Err(ConsoleError::Refused { command: command.to_owned(), answer: line });
+                return Err(Refused { command: command.to_owned(), answer: line }.into());
             }
             answer.push(line);
         }

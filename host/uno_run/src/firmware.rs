@@ -26,7 +26,7 @@ static INSIDE: OnceLock<&[(&str, &[u8])]> = OnceLock::new();
 static WRITTEN: OnceLock<Result<PathBuf, String>> = OnceLock::new();
 
 /// A program for the chip.
-struct Program {
+pub struct Program {
     /// Its package, which is also its binary's name, and the alias that builds it.
     package: &'static str,
     alias: &'static str,
@@ -35,8 +35,10 @@ struct Program {
 }
 
 static FIRMWARE: Program = Program::new("weeder-firmware", "firmware");
-static BENCH: Program = Program::new("knn-bench", "bench-firmware");
-static TESTER: Program = Program::new("tester-firmware", "tester-firmware");
+/// The classifier's bench, which [`bench`](mod@crate::bench) runs.
+pub static BENCH: Program = Program::new("knn-bench", "bench-firmware");
+/// The firmware of the tester, the Uno that checks another one.
+pub static TESTER: Program = Program::new("tester-firmware", "tester-firmware");
 
 /// Variables of an outer cargo or a shell that would change how the firmware is compiled.
 const FOREIGN_SETTINGS: [&str; 9] = [
@@ -62,31 +64,12 @@ pub fn put_inside(files: &'static [(&'static str, &'static [u8])]) {
     INSIDE.get_or_init(|| files);
 }
 
-/// The firmware's ELF: that inside this program, or else that of this workspace, which is built.
-///
-/// Cargo runs at most once a process; later calls return the first one's answer. Its progress and the compiler's
-/// messages go to standard error.
+/// The firmware's ELF.
 ///
 /// # Errors
-/// Where it can neither be written nor built: cargo cannot be started, fails, or makes no ELF.
+/// As [`Program::elf`].
 pub fn build() -> Result<PathBuf> {
-    FIRMWARE.build_once()
-}
-
-/// Builds the classifier's bench, which [`bench`](mod@crate::bench) runs, and returns the path of its ELF.
-///
-/// # Errors
-/// As [`build`].
-pub fn build_bench() -> Result<PathBuf> {
-    BENCH.build_once()
-}
-
-/// Builds the firmware of the tester, the Uno that checks another one. Returns the path of its ELF.
-///
-/// # Errors
-/// As [`build`].
-pub fn build_tester() -> Result<PathBuf> {
-    TESTER.build_once()
+    FIRMWARE.elf()
 }
 
 impl Program {
@@ -94,7 +77,14 @@ impl Program {
         Self { package, alias, built: OnceLock::new() }
     }
 
-    fn build_once(&self) -> Result<PathBuf> {
+    /// The program's ELF: that inside this program, or else that of this workspace, which is built.
+    ///
+    /// Cargo runs at most once a process; later calls return the first one's answer. Its progress and the compiler's
+    /// messages go to standard error.
+    ///
+    /// # Errors
+    /// If it can neither be written nor built: cargo cannot be started, fails, or makes no ELF.
+    pub fn elf(&self) -> Result<PathBuf> {
         if let Some(folder) = inside()? {
             return Ok(folder.join(self.package).with_extension("elf"));
         }
@@ -125,11 +115,10 @@ impl Program {
         let mut elf = None;
         if let Some(messages) = cargo.stdout.take() {
             for message in Message::parse_stream(BufReader::new(messages)) {
-                match message.context("cargo's messages could not be read")? {
-                    Message::CompilerArtifact(artifact) if artifact.target.name == self.package => {
-                        elf = artifact.executable.map(PathBuf::from).or(elf);
-                    }
-                    _ => {}
+                if let Message::CompilerArtifact(artifact) = message.context("cargo's messages could not be read")?
+                    && artifact.target.name == self.package
+                {
+                    elf = artifact.executable.map(PathBuf::from).or(elf);
                 }
             }
         }

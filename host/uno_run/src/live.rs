@@ -114,18 +114,12 @@ const TICKS_IN_A_PERIOD: f64 = 4.0;
 
 impl Course {
     /// A machine with one or several rows and one wheel: one course for each row. All rows roll along the same ground at
-    /// the same time.
-    pub fn of_rows(rows: Vec<Row>, machine: Machine, speed_mm_s: f64) -> Vec<Self> {
+    /// the same time. The wheel turns farther than the machine rolls by the share `slip` of its distance.
+    pub fn of_rows(rows: Vec<Row>, machine: Machine, speed_mm_s: f64, slip: f64) -> Vec<Self> {
         let spans = || rows.iter().map(Row::span_mm);
         let start = spans().map(|span| span.start).fold(f64::INFINITY, f64::min);
         let end = spans().map(|span| span.end).fold(f64::NEG_INFINITY, f64::max);
-        rows.into_iter().map(|row| Self { row, machine, speed_mm_s, span_mm: start..end, slip: 0.0 }).collect()
-    }
-
-    /// The same, with a wheel that turns farther than the machine rolls by this share of its distance.
-    #[must_use]
-    pub fn slipping(self, slip: f64) -> Self {
-        Self { slip, ..self }
+        rows.into_iter().map(|row| Self { row, machine, speed_mm_s, span_mm: start..end, slip }).collect()
     }
 
     /// How far the machine rolls each time.
@@ -160,18 +154,17 @@ impl Course {
     }
 }
 
-/// The distance travelled: the total before the present run, the start time of that run, and its motion.
+/// The distance travelled: the total before the last run, the start time of that run, and its motion.
 struct Way {
     before_mm: f64,
-    since: Option<(f64, Motion)>,
+    set_off_s: f64,
+    motion: Motion,
 }
 
 impl Way {
     /// The distance travelled at a time, in metres.
     fn rolled_m(&self, time_s: f64) -> f64 {
-        let since_mm = self.since.as_ref().map_or(0.0, |(set_off_s, motion)| {
-            motion.position_mm((time_s - set_off_s).clamp(0.0, motion.duration_s())) - motion.start_mm()
-        });
+        let since_mm = self.motion.position_mm(time_s - self.set_off_s) - self.motion.start_mm();
         (self.before_mm + since_mm) / 1000.0
     }
 }
@@ -218,7 +211,6 @@ struct Arm {
     /// The pulses that commanded another angle than the one before.
     pulses: Vec<Pulse>,
     stroke: Option<Stroke>,
-    is_out: bool,
 }
 
 /// Swings in memory: enough for a day. After that their random values repeat.
@@ -227,10 +219,10 @@ const SWINGS: usize = 10_000;
 impl Arm {
     fn of(machine: &Machine) -> Self {
         let Machine { servo, clear_within_degrees, .. } = *machine;
-        Self { servo, clear_within_degrees, rise: None, pulses: Vec::new(), stroke: None, is_out: false }
+        Self { servo, clear_within_degrees, rise: None, pulses: Vec::new(), stroke: None }
     }
 
-    /// Takes pin changes. Returns whether the arm is fully out at a cycle, if this has changed.
+    /// Takes pin changes. Returns whether the arm is fully out at a cycle; `None` before the first pulse.
     fn turn(&mut self, changes: &[PinChange], cycle: u64) -> Option<bool> {
         for change in changes.iter().filter(|change| change.pin == wiring::SERVO) {
             match (change.high, self.rise.take()) {
@@ -242,10 +234,7 @@ impl Arm {
         let degrees = self.stroke.as_ref()?.degrees(time_at_s(0, cycle));
         // The firmware's stroke may differ from the machine's. Fully out is the angle of the firmware's pulse.
         let out_degrees = self.servo.stroke_degrees().min(self.farthest_degrees());
-        let is_out = degrees >= out_degrees - self.clear_within_degrees;
-        let changes = is_out != self.is_out;
-        self.is_out = is_out;
-        changes.then_some(is_out)
+        Some(degrees >= out_degrees - self.clear_within_degrees)
     }
 
     /// The greatest angle that was asked for lately.
@@ -311,7 +300,7 @@ impl LiveUno {
             sets_off: STANDING_S * CYCLES_PER_SECOND,
             course: setup.course,
             runs: setup.runs,
-            way: Way { before_mm: 0.0, since: None },
+            way: Way { before_mm: 0.0, set_off_s: 0.0, motion: Motion::starting_at(0.0) },
             eeprom,
             unread: VecDeque::new(),
             resets_when_opened: !setup.keeps_running_when_opened,
@@ -394,7 +383,7 @@ impl LiveUno {
             self.uno.drive(course.machine.pin_changes(&course.row, &motion, self.sets_off));
             let end = cycle_at(self.sets_off, motion.duration_s());
             let set_off_s = self.sets_off as f64 / CYCLES_PER_SECOND as f64;
-            self.way = Way { before_mm: 1000.0 * self.way.rolled_m(set_off_s), since: Some((set_off_s, motion)) };
+            self.way = Way { before_mm: 1000.0 * self.way.rolled_m(set_off_s), set_off_s, motion };
             self.sets_off = end + if self.runs.is_some() { 0 } else { STANDING_S * CYCLES_PER_SECOND };
         }
     }

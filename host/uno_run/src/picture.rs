@@ -68,8 +68,7 @@ fn draw_lane(row: &Row, judgement: &Judgement, ground: &Range<f64>, clip: &str) 
     ];
     for (stretches, y, height, colour) in strips {
         for stretch in stretches.iter().filter(|stretch| is_here(stretch)) {
-            let (from, to) = (stretch.start.max(ground.start), stretch.end.min(ground.end));
-            drawn = drawn.add(rectangle(x(from), y, x(to) - x(from), height, colour));
+            drawn = drawn.add(rectangle(x(stretch.start), y, x(stretch.end) - x(stretch.start), height, colour));
         }
     }
     for canopy in row.canopies().iter().filter(|canopy| is_here(&canopy.span_mm())) {
@@ -86,18 +85,19 @@ fn draw_lane(row: &Row, judgement: &Judgement, ground: &Range<f64>, clip: &str) 
     for plant in judgement.plants.iter().filter(|plant| is_here(&plant.plant.span_mm())) {
         drawn = drawn.add(canopy(&plant.plant, x(plant.plant.position_mm), plant.verdict));
     }
-    for part in parts_within(&judgement.path, ground) {
-        let points: Vec<String> =
-            part.into_iter().map(|(place_mm, degrees)| format!("{:.1},{:.1}", x(place_mm), angle_y(degrees))).collect();
-        drawn = drawn.add(
-            Polyline::new()
-                .set("points", points.join(" "))
-                .set("fill", "none")
-                .set("stroke", NOTE)
-                .set("stroke-width", 1.6)
-                .set("stroke-linejoin", "round"),
-        );
-    }
+    // Between two pieces over this ground the path may go on beyond an end, where the clip cuts it.
+    let is_over = |piece: &&[(f64, f64)]| is_here(&(piece[0].0.min(piece[1].0)..piece[0].0.max(piece[1].0)));
+    let point = |&(place_mm, degrees): &(f64, f64)| format!("{:.1},{:.1}", x(place_mm), angle_y(degrees));
+    let mut points: Vec<String> = judgement.path.windows(2).filter(is_over).flatten().map(point).collect();
+    points.dedup();
+    drawn = drawn.add(
+        Polyline::new()
+            .set("points", points.join(" "))
+            .set("fill", "none")
+            .set("stroke", NOTE)
+            .set("stroke-width", 1.6)
+            .set("stroke-linejoin", "round"),
+    );
 
     let clip = ClipPath::new().set("id", clip).add(rectangle(0.0, 0.0, length, LANE_HEIGHT, "#000"));
     Group::new()
@@ -108,36 +108,6 @@ fn draw_lane(row: &Row, judgement: &Judgement, ground: &Range<f64>, clip: &str) 
         .add(words(-8.0, IN_Y + 4.0, "in 0°", PALE_INK).set("text-anchor", "end"))
         .add(drawn)
         .add(scale(ground))
-}
-
-/// The parts of a path of positions and degrees over this ground, cut at its ends. There are several if the machine
-/// rolled back.
-fn parts_within(path: &[(f64, f64)], ground: &Range<f64>) -> Vec<Vec<(f64, f64)>> {
-    let mut parts: Vec<Vec<(f64, f64)>> = Vec::new();
-    for piece in path.windows(2) {
-        let Some((from, to)) = piece_within(piece[0], piece[1], ground) else { continue };
-        match parts.last_mut() {
-            Some(part) if part.last() == Some(&from) => part.push(to),
-            _ => parts.push(vec![from, to]),
-        }
-    }
-    parts
-}
-
-/// The part of a straight piece over this ground.
-fn piece_within(from: (f64, f64), to: (f64, f64), ground: &Range<f64>) -> Option<((f64, f64), (f64, f64))> {
-    let (rolled_mm, turn) = (to.0 - from.0, to.1 - from.1);
-    if rolled_mm == 0.0 {
-        // The tool swung while the machine stood.
-        return ground.contains(&from.0).then_some((from, to));
-    }
-    let share_at = |place_mm: f64| (place_mm - from.0) / rolled_mm;
-    let (a, b) = (share_at(ground.start), share_at(ground.end));
-    let (first, last) = (a.min(b), a.max(b));
-    let at = |share: f64| (from.0 + share * rolled_mm, from.1 + share * turn);
-    let begin = if first > 0.0 { at(first) } else { from };
-    let end = if last < 1.0 { at(last) } else { to };
-    (first < 1.0 && last > 0.0).then_some((begin, end))
 }
 
 fn canopy(plant: &Canopy, x: f64, verdict: Verdict) -> Group {
@@ -255,29 +225,17 @@ mod tests {
     }
 
     #[test]
-    fn a_lane_has_the_curve_over_its_own_ground() {
-        let path = [(-1000.0, 45.0), (500.0, 45.0), (1500.0, 0.0), (9000.0, 0.0)];
-        assert_eq!(parts_within(&path, &(0.0..1000.0)), [[(0.0, 45.0), (500.0, 45.0), (1000.0, 22.5)]]);
-        assert_eq!(parts_within(&path, &(1000.0..3000.0)), [[(1000.0, 22.5), (1500.0, 0.0), (3000.0, 0.0)]]);
-        assert!(parts_within(&path, &(9000.0..9500.0)).is_empty());
-    }
-
-    #[test]
-    fn a_curve_that_leaves_a_lane_and_comes_back_is_broken_there() {
-        let path = [(0.0, 0.0), (2000.0, 0.0), (2000.0, 45.0), (500.0, 45.0), (500.0, 0.0)];
-        let parts = parts_within(&path, &(0.0..1000.0));
-        assert_eq!(parts, [vec![(0.0, 0.0), (1000.0, 0.0)], vec![(1000.0, 45.0), (500.0, 45.0), (500.0, 0.0)]]);
-    }
-
-    #[test]
-    fn the_curve_ends_with_the_rows_ground() {
-        let (pass, outcome) = ruined_row();
-        let drawn = draw(&pass.row, &outcome.judgement).to_string();
-        let ground = pass.row.span_mm();
-        let length = (ground.end - ground.start) * PIXELS_PER_MM;
-        let curves = drawn.split("points=\"").skip(1).map(|rest| rest.split('"').next().unwrap());
-        let xs = curves.flat_map(|points| points.split(' ')).map(|point| point.split(',').next().unwrap());
-        let xs: Vec<f64> = xs.map(|x| x.parse().unwrap()).collect();
-        assert!(!xs.is_empty() && xs.iter().all(|x| (0.0..=length + 0.05).contains(x)), "{xs:?} in {length}");
+    fn a_lane_shows_the_curve_over_its_own_ground_alone() {
+        let (pass, mut outcome) = ruined_row();
+        // The machine rolls back over its ground, with the tool out.
+        outcome.judgement.path =
+            vec![(-1000.0, 45.0), (-500.0, 0.0), (2000.0, 0.0), (2000.0, 45.0), (500.0, 45.0), (500.0, 0.0)];
+        let drawn = draw_lane(&pass.row, &outcome.judgement, &(0.0..1000.0), "lane").to_string();
+        let curve = drawn.split("points=\"").nth(1).and_then(|rest| rest.split('"').next());
+        // The lane's clip cuts what the two pieces across its ends have beyond them.
+        assert_eq!(curve, Some("-200.0,132.0 800.0,132.0 800.0,96.0 200.0,96.0 200.0,132.0"));
+        let (clip, clipped) = drawn.split_once("clip-path=\"url(#lane)\"").unwrap();
+        assert!(clip.contains("<rect fill=\"#000\" height=\"168\" width=\"400\" x=\"0\" y=\"0\"/>"), "{clip}");
+        assert!(clipped.contains("<polyline"));
     }
 }

@@ -6,7 +6,7 @@
 
 use crate::console::Status;
 use crate::run::{PROGRESS_CYCLES, PassError, boot};
-use control::measure::quadrature::{Channels, Quadrature, Step};
+use field::machine::counts;
 use field::wiring;
 use std::path::Path;
 use uno::PinChange;
@@ -104,17 +104,7 @@ fn split_first_levels(changes: &[PinChange]) -> (Vec<PinChange>, Vec<PinChange>)
 /// Where to pause, as numbers of played edges: after the edges that bring a perfect counter to its lowest and highest
 /// count, and after the last edge.
 fn pauses(first_levels: &[PinChange], edges: &[PinChange]) -> Vec<usize> {
-    let mut levels: Channels = 0;
-    for change in first_levels {
-        apply(&mut levels, change);
-    }
-    let mut decoder = Quadrature::new(levels);
-    let mut counts = vec![0];
-    for change in edges {
-        apply(&mut levels, change);
-        let ticks = if let Step::Ticks(ticks) = decoder.step(levels) { i64::from(ticks) } else { 0 };
-        counts.push(counts[counts.len() - 1] + ticks);
-    }
+    let counts = counts(first_levels, edges);
     // Of equal counts, each takes the first.
     let lowest = (0..counts.len()).min_by_key(|&edge| counts[edge]).unwrap_or(0);
     let highest = (0..counts.len()).rev().max_by_key(|&edge| counts[edge]).unwrap_or(0);
@@ -122,16 +112,6 @@ fn pauses(first_levels: &[PinChange], edges: &[PinChange]) -> Vec<usize> {
     pauses.sort_unstable();
     pauses.dedup();
     pauses
-}
-
-/// Applies a pin change to the pair of channels.
-fn apply(levels: &mut Channels, change: &PinChange) {
-    let bit = match change.pin {
-        wiring::ENCODER_A => 0b10,
-        wiring::ENCODER_B => 0b01,
-        _ => return,
-    };
-    *levels = if change.high { *levels | bit } else { *levels & !bit };
 }
 
 #[cfg(test)]

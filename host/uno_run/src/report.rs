@@ -7,9 +7,7 @@ use crate::run::Outcome;
 use comfy_table::{Attribute, Cell, CellAlignment, Color, Row, Table, presets};
 use field::counted;
 use field::machine::Machine;
-use field::motion::Motion;
 use field::pass::Pass;
-use field::row;
 use field::verdict::{Judgement, PlantOutcome, Verdict, WeedOutcome};
 use serde::Serialize;
 use std::fmt::Write;
@@ -190,7 +188,7 @@ pub struct PlantRecord {
     out_error_ticks: Option<f64>,
     in_error_ticks: Option<f64>,
     swings: usize,
-    verdict: &'static str,
+    verdict: String,
 }
 
 /// The result for a tall weed, as a line of a table.
@@ -213,25 +211,19 @@ pub fn plants(outcome: &Outcome) -> Vec<PlantRecord> {
         out_error_ticks: plant.out_error_ticks,
         in_error_ticks: plant.in_error_ticks,
         swings: plant.swings,
-        verdict: match plant.verdict {
-            Verdict::Kept => "kept",
-            Verdict::MarginCut => "margin_cut",
-            Verdict::Reached => "zone_reached",
-            Verdict::Damaged => "damaged",
-        },
+        verdict: plant.verdict.to_string().to_lowercase().replace(' ', "_"),
     };
     outcome.judgement.plants.iter().map(record).collect()
 }
 
 /// A line per tall weed.
 pub fn weeds(outcome: &Outcome) -> Vec<WeedRecord> {
-    let weeds = outcome.judgement.weeds.iter();
     let record = |weed: &WeedOutcome| WeedRecord {
         position_mm: weed.weed.position_mm,
         width_mm: weed.weed.width_mm,
         cut: weed.cut,
     };
-    weeds.map(record).collect()
+    outcome.judgement.weeds.iter().map(record).collect()
 }
 
 /// Writes [`plants`] or [`weeds`] as a CSV table.
@@ -246,7 +238,7 @@ pub fn write_csv(records: &[impl Serialize], to: impl io::Write) -> Result<(), c
 }
 
 /// The pass, in a line.
-pub fn introduction(row: &row::Row, machine: &Machine, motion: &Motion) -> String {
+pub fn introduction(Pass { row, machine, motion, .. }: &Pass) -> String {
     let span = row.span_mm();
     format!(
         "{} and {} on {:.2} m of row, beam {:.0} mm ahead of the tool, {:.0} s on the field",
@@ -268,9 +260,8 @@ pub(crate) mod tests {
 
     /// A pass in which the tool stayed in the row from one second on, and its outcome.
     pub fn ruined_row() -> (Pass, Outcome) {
-        let row =
-            row::Row::new(vec![Canopy::plant(500.0, 150.0), Canopy::weed(750.0, 15.0), Canopy::plant(1000.0, 150.0)])
-                .unwrap();
+        let canopies = vec![Canopy::plant(500.0, 150.0), Canopy::weed(750.0, 15.0), Canopy::plant(1000.0, 150.0)];
+        let row = field::row::Row::new(canopies).unwrap();
         let pass = Pass::at_speed(row, Machine::default(), Timing::default(), mm_s(1.0));
         let frame = |rise, width_us: u64| Pulse { rise, fall: rise + width_us * CYCLES_PER_SECOND / 1_000_000 };
         let pulses = vec![frame(0, 2000), frame(CYCLES_PER_SECOND, 1500)];
@@ -315,7 +306,7 @@ pub(crate) mod tests {
         outcome.stray_pulses = 2;
         let words = totals(&pass, &outcome);
         assert!(words.contains("2 pulses of a width that no servo knows: ignored"), "{words}");
-        let introduction = introduction(&pass.row, &pass.machine, &pass.motion);
+        let introduction = introduction(&pass);
         assert!(introduction.starts_with("2 plants and 1 tall weed on 1.00 m of row"), "{introduction}");
     }
 

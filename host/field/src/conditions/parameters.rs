@@ -5,6 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use strum::VariantNames;
 
 /// A parameter in the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,19 +37,15 @@ impl Parameter {
 }
 
 /// How the arm hangs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, VariantNames)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum Arm {
     /// It hangs from the servo's shaft, which lies along the row. A stroke lifts the tool.
     #[default]
     Pendulum,
     /// It lies along the row behind an upright shaft. A stroke carries the tool forward.
     Trailing,
-}
-
-impl Arm {
-    /// The arms' names, by number.
-    pub const NAMES: [&str; 2] = ["pendulum", "trailing"];
 }
 
 impl From<Arm> for f64 {
@@ -65,7 +62,7 @@ trait Words {
 impl Words for f64 {}
 impl Words for u32 {}
 impl Words for Arm {
-    const WORDS: &'static [&'static str] = &Arm::NAMES;
+    const WORDS: &'static [&'static str] = Arm::VARIANTS;
 }
 
 /// The one table of parameters, from which all other code is made.

@@ -1,9 +1,7 @@
 //! The swings of the tool, from the servo's commands.
 
 use crate::machine::time_at_s;
-use crate::motion::Motion;
 use crate::servo::Command;
-use std::ops::Range;
 
 /// The time from a command out of the row to the next one into it.
 pub(super) struct Swing {
@@ -11,24 +9,17 @@ pub(super) struct Swing {
     pub(super) out_s: Option<f64>,
     /// `None` if the tool is still out at the end.
     pub(super) in_s: Option<f64>,
-    pub(super) during_s: Range<f64>,
 }
 
 impl Swing {
     /// The swings that these commands make, in order of time.
-    pub(super) fn all(commands: &[Command], motion: &Motion, start_cycle: u64) -> Vec<Self> {
+    pub(super) fn all(commands: &[Command], start_cycle: u64) -> Vec<Self> {
         let mut swings: Vec<Self> = Vec::new();
         for (index, command) in commands.iter().enumerate() {
             let time_s = time_at_s(start_cycle, command.rise_cycle);
             match swings.last_mut().filter(|swing| swing.in_s.is_none()) {
-                Some(swing) if !command.is_out => {
-                    swing.in_s = Some(time_s);
-                    swing.during_s.end = time_s;
-                }
-                None if command.is_out => {
-                    let out_s = (index > 0).then_some(time_s);
-                    swings.push(Self { out_s, in_s: None, during_s: out_s.unwrap_or(0.0)..motion.duration_s() });
-                }
+                Some(swing) if !command.is_out => swing.in_s = Some(time_s),
+                None if command.is_out => swings.push(Self { out_s: (index > 0).then_some(time_s), in_s: None }),
                 _ => {}
             }
         }

@@ -58,12 +58,9 @@ impl Eeprom {
 
     /// The bytes of the examples, with the one that is being written.
     pub fn examples(&self) -> [u8; SIZE] {
-        let chip = self.0.borrow();
-        let mut bytes = chip.bytes;
-        if let Some((address, byte)) = chip.under_way {
-            bytes[address] = byte;
-        }
-        std::array::from_fn(|index| bytes[SIZE + index])
+        let mut chip = self.0.borrow().clone();
+        chip.finish();
+        std::array::from_fn(|index| chip.bytes[SIZE + index])
     }
 
     /// Changes a byte, as a failing cell would.

@@ -60,18 +60,6 @@ pub struct Ran {
     pub threads: usize,
 }
 
-impl Ran {
-    /// Simulated seconds in a second of the host.
-    pub fn times_real_time(&self) -> f64 {
-        self.simulated.as_secs_f64() / self.took.as_secs_f64().max(f64::EPSILON)
-    }
-
-    /// Number of cores for running in real time.
-    pub fn cores_in_real_time(&self) -> f64 {
-        self.cores.as_secs_f64() / self.simulated.as_secs_f64().max(f64::EPSILON)
-    }
-}
-
 impl LiveRows {
     /// Powers up all Unos. Their courses must be those of one machine. The first course decides whether they run in
     /// real time.

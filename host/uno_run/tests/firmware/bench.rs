@@ -7,7 +7,7 @@ use uno_run::{bench, firmware};
 
 #[test]
 fn a_classification_among_32_examples_in_flash_takes_at_most_3900_cycles() {
-    let elf = firmware::build_bench().expect("the bench builds");
+    let elf = firmware::BENCH.elf().expect("the bench builds");
     let costs = bench::classifier(&elf, |_| ()).expect("the bench runs, and every answer is the plain search's");
     let (_, cycles) = costs.tasks.iter().find(|(task, _)| *task == Task::Classify(32)).expect("it is measured");
     assert!(cycles.mean <= 3900.0, "{cycles:?}");

@@ -127,7 +127,7 @@ fn without_firmware_and_bootloader_there_is_nothing_to_run() {
 #[test]
 fn the_machine_rolls_along_its_row_and_stands_between() {
     let row = Row::new(vec![Canopy::plant(500.0, 150.0)]).unwrap();
-    let course = Course::of_rows(vec![row], Machine::default(), 2000.0).pop();
+    let course = Course::of_rows(vec![row], Machine::default(), 2000.0, 0.0).pop();
     let uno = start(Setup { course, fast: true, ..product() });
     let mut link = open(&uno);
     let mut positions = Vec::new();

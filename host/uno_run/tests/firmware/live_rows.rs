@@ -37,7 +37,7 @@ fn row(plants: usize, seed: u64) -> Row {
 /// Setups of a machine with these rows.
 fn setups(rows: Vec<Row>, fast: bool) -> Vec<Setup> {
     let elf = firmware::build().expect("the firmware builds");
-    let courses = Course::of_rows(rows, Machine::default(), SPEED_MM_S).into_iter();
+    let courses = Course::of_rows(rows, Machine::default(), SPEED_MM_S, 0.0).into_iter();
     courses.map(|course| Setup { elf: Some(elf.clone()), course: Some(course), fast, ..Setup::default() }).collect()
 }
 

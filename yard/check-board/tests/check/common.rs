@@ -24,7 +24,7 @@ pub fn boards_and_pair(wiring: Wiring) -> (Rc<RefCell<Pair>>, Boards) {
 
 /// The same with another firmware of the weeder.
 pub fn boards_with(weeder: &Path, wiring: Wiring) -> (Rc<RefCell<Pair>>, Boards) {
-    let tester = firmware::build_tester().expect("the tester's firmware is built");
+    let tester = firmware::TESTER.elf().expect("the tester's firmware is built");
     let pair = Rc::new(RefCell::new(Pair::power_up(&tester, weeder, None, wiring).expect("both start")));
     let tester = Tester::over(PairPort { pair: Rc::clone(&pair), side: Side::Tester }).expect("the tester answers");
     let opened = Rc::clone(&pair);

@@ -99,7 +99,7 @@ fn a_measured_row_agrees_with_the_simulation() {
 
 #[test]
 fn the_boards_are_found_at_two_terminals() {
-    let (tester, weeder) = (firmware::build_tester().expect("it is built"), firmware::build().expect("it is built"));
+    let (tester, weeder) = (firmware::TESTER.elf().expect("it is built"), firmware::build().expect("it is built"));
     let desk = Desk::start(&tester, &weeder, None).expect("it starts");
     // The weeder's port is first, and no port is named.
     let unos = [desk.weeder(), desk.tester()].map(|path: &Path| path.to_str().expect("it is text").to_owned());
