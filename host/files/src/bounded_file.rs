@@ -74,7 +74,9 @@ pub fn check_nesting(path: &Path, text: &str) -> Result<(), FileError> {
     for token in Source::new(text).lex() {
         match token.kind() {
             TokenKind::LeftSquareBracket | TokenKind::LeftCurlyBracket => (depth, dots) = (depth + 1, 0),
-            TokenKind::RightSquareBracket | TokenKind::RightCurlyBracket => (depth, dots) = (depth.saturating_sub(1), 0),
+            TokenKind::RightSquareBracket | TokenKind::RightCurlyBracket => {
+                (depth, dots) = (depth.saturating_sub(1), 0)
+            }
             TokenKind::Equals | TokenKind::Comma | TokenKind::Newline => dots = 0,
             TokenKind::Dot => dots += 1,
             _ => {}

@@ -34,23 +34,22 @@ pub struct Hub {
 }
 
 struct State {
-    /// The greeting after each machine's last restart at work, until it works again.
-    restarted: Vec<Option<String>>,
     /// Each machine's state, as the first message to a new page.
     machines: Vec<Value>,
+    /// The message about each machine's last restart at work, until it works again.
+    restarted: Vec<Option<Value>>,
     knowledge: Knowledge,
 }
 
 impl Hub {
     /// This number of machines, before the message with the number `first`.
     pub fn new(machines: usize, first: u64, clock: Clock) -> Self {
-        let knowledge = Knowledge::new(first, machines);
-        let lost = (0..machines).map(|machine| lost(machine, "its port is being opened")).collect();
-        Self {
-            clock,
-            state: Mutex::new(State { restarted: vec![None; machines], machines: lost, knowledge }),
-            pages: broadcast::channel(BEHIND * machines.max(2)).0,
-        }
+        let state = State {
+            machines: (0..machines).map(|machine| lost(machine, "its port is being opened")).collect(),
+            restarted: vec![None; machines],
+            knowledge: Knowledge::new(first, machines),
+        };
+        Self { clock, state: Mutex::new(state), pages: broadcast::channel(BEHIND * machines.max(2)).0 }
     }
 
     /// The present moment.
@@ -60,17 +59,15 @@ impl Hub {
 
     /// The machine is connected: the firmware's version, and the lines that show its settings and examples.
     pub fn there(&self, machine: usize, version: &str, settings: &[String], examples: &[String]) {
-        self.change(
-            machine,
-            json!({
-                "machine": machine,
-                "is": "there",
-                "version": version,
-                "settings": settings,
-                "examples": examples,
-                "help": helps(),
-            }),
-        );
+        let there = json!({
+            "machine": machine,
+            "is": "there",
+            "version": version,
+            "settings": settings,
+            "examples": examples,
+            "help": helps(),
+        });
+        self.change(machine, there);
     }
 
     pub fn lost(&self, machine: usize, why: &str) {
@@ -81,8 +78,8 @@ impl Hub {
     pub fn know(&self, machine: usize, what: &str, said: Value) {
         let mut state = self.state.lock();
         self.send(&mut state, &json!({ "machine": machine, "is": what, "said": said }));
-        if let Some(known) = state.machines.get_mut(machine).filter(|known| known["is"] == "there") {
-            known[what] = said;
+        if state.machines[machine]["is"] == "there" {
+            state.machines[machine][what] = said;
         }
     }
 
@@ -94,17 +91,14 @@ impl Hub {
     /// The machine has restarted at work, with this greeting. Every page shows this until it works again.
     pub fn restarted(&self, machine: usize, greeting: &str) {
         let mut state = self.state.lock();
-        if let Some(restarted) = state.restarted.get_mut(machine) {
-            *restarted = Some(greeting.to_owned());
-        }
-        self.send(&mut state, &json!({ "machine": machine, "is": "restarted", "said": greeting }));
+        let restarted = json!({ "machine": machine, "is": "restarted", "said": greeting });
+        self.send(&mut state, &restarted);
+        state.restarted[machine] = Some(restarted);
     }
 
     /// The machine works.
     pub fn works(&self, machine: usize) {
-        if let Some(restarted) = self.state.lock().restarted.get_mut(machine) {
-            *restarted = None;
-        }
+        self.state.lock().restarted[machine] = None;
     }
 
     /// The machine is to hold, or holds: commands of senders that do not know this yet are refused.
@@ -129,10 +123,7 @@ impl Hub {
 
     /// Why a machine is lost; `None` if it is connected.
     pub fn why_lost(&self, machine: usize) -> Option<String> {
-        match self.state.lock().machines.get(machine) {
-            Some(known) => known["why"].as_str().map(str::to_owned),
-            None => Some("there is no such machine".to_owned()),
-        }
+        self.state.lock().machines[machine]["why"].as_str().map(str::to_owned)
     }
 
     /// The present state of all machines, and the receiver of later messages.
@@ -140,22 +131,16 @@ impl Hub {
         let mut state = self.state.lock();
         let State { machines, knowledge, restarted } = &mut *state;
         let now = self.now();
-        let mut message = |known: &Value| Message { number: knowledge.number(now), text: known.to_string().into() };
-        let mut messages: Vec<Message> = machines.iter().map(&mut message).collect();
-        for (machine, greeting) in restarted.iter().enumerate() {
-            if let Some(greeting) = greeting {
-                messages.push(message(&json!({ "machine": machine, "is": "restarted", "said": greeting })));
-            }
-        }
+        let known = machines.iter().chain(restarted.iter().flatten());
+        let message = |known: &Value| Message { number: knowledge.number(now), text: known.to_string().into() };
+        let messages = known.map(message).collect();
         (messages, self.pages.subscribe())
     }
 
     fn change(&self, machine: usize, message: Value) {
         let mut state = self.state.lock();
         self.send(&mut state, &message);
-        if let Some(known) = state.machines.get_mut(machine) {
-            *known = message;
-        }
+        state.machines[machine] = message;
     }
 
     /// Sends while the lock is held, so that a page does not get a change twice: its first state may already include it.
@@ -177,10 +162,8 @@ fn lost(machine: usize, why: &str) -> Value {
 mod tests {
     use super::*;
 
-    fn heard(pages: &mut Receiver<Message>) -> Vec<Value> {
-        std::iter::from_fn(|| pages.try_recv().ok())
-            .map(|message| serde_json::from_str(&message.text).unwrap())
-            .collect()
+    fn read(message: &Message) -> Value {
+        serde_json::from_str(&message.text).unwrap()
     }
 
     #[test]
@@ -192,7 +175,7 @@ mod tests {
         // A lost machine has no status.
         hub.know(1, "status", "state=work".into());
         let (now, mut later) = hub.listen();
-        let mut now: Vec<Value> = now.iter().map(|message| serde_json::from_str(&message.text).unwrap()).collect();
+        let mut now: Vec<Value> = now.iter().map(read).collect();
         let help = now[0].as_object_mut().unwrap().remove("help").unwrap();
         assert_eq!(help["wheel_mm"], "wheel diameter");
         let expected = [
@@ -207,14 +190,15 @@ mod tests {
             json!({ "machine": 1, "is": "lost", "why": "its port is being opened" }),
         ];
         assert_eq!(now, expected);
-        assert_eq!((hub.why_lost(0), hub.why_lost(2).is_some()), (None, true));
+        assert_eq!(hub.why_lost(0), None);
         hub.event(0, "state=work");
         hub.lost(0, "pulled");
         let expected = [
             json!({ "machine": 0, "is": "event", "said": "state=work" }),
             json!({ "machine": 0, "is": "lost", "why": "pulled" }),
         ];
-        assert_eq!(heard(&mut later), expected);
+        let heard: Vec<Value> = std::iter::from_fn(|| later.try_recv().ok()).map(|message| read(&message)).collect();
+        assert_eq!(heard, expected);
         assert_eq!(hub.why_lost(0).as_deref(), Some("pulled"));
     }
 }

@@ -3,7 +3,6 @@
 
 use super::hub::Hub;
 use super::knowledge::Stale;
-use super::rules::Order;
 use link::advice;
 use link::connection::{Connection, Opener, PAUSE};
 use link::moment::Moment;
@@ -66,6 +65,7 @@ pub struct Machine {
     /// The operator's name for it.
     pub name: String,
     number: usize,
+    hub: Arc<Hub>,
     commands: mpsc::Sender<Asked>,
     holds: mpsc::Sender<Asked>,
 }
@@ -73,36 +73,35 @@ pub struct Machine {
 impl Machine {
     /// Starts its thread, which ends when the machine is dropped.
     pub fn start(number: usize, name: String, open: Opener, hub: Arc<Hub>, tell: Tell) -> Self {
-        let (commands, commands_to_type) = mpsc::channel(WAITING);
-        let (holds, holds_to_type) = mpsc::channel(WAITING);
-        let named = name.clone();
+        let (machine, asked) = Self::new(number, name, hub);
+        let (named, hub) = (machine.name.clone(), Arc::clone(&machine.hub));
         thread::spawn(move || {
-            let mut connection = Connection::waiting_for(open);
-            (connection.session.keeps_hold, connection.session.keeps_events) = (true, true);
-            Talk::new(number, named, hub, tell).run(connection, commands_to_type, holds_to_type);
-        });
-        Self { name, number, commands, holds }
-    }
-
-    /// Carries out a client's line, if the client has seen a message that is recent enough. HOLD needs none.
-    pub async fn take(&self, hub: &Hub, order: Order, line: String, seen: u64) -> Answer {
-        match order {
-            Order::Hold => {
-                hub.hold(self.number);
-                self.hold().await
+            let mut talk = Talk::new(number, named, hub, tell, open, asked);
+            while talk.turn() {
+                if !talk.connection.session.is_open() {
+                    thread::sleep(PAUSE);
+                }
             }
-            Order::Type => self.command(line, hub.deadline(self.number, seen)?).await,
-        }
+        });
+        machine
     }
 
-    /// Types a command after the commands before it have been answered, if that is before a deadline.
-    async fn command(&self, line: String, deadline: Moment) -> Answer {
-        ask(&self.commands, line, deadline).await
+    /// A machine, and its clients' commands and holds.
+    fn new(number: usize, name: String, hub: Arc<Hub>) -> (Self, [mpsc::Receiver<Asked>; 2]) {
+        let [(commands, to_type), (holds, to_hold)] = [mpsc::channel(WAITING), mpsc::channel(WAITING)];
+        (Self { name, number, hub, commands, holds }, [to_type, to_hold])
+    }
+
+    /// Types a client's command after the commands before it have been answered, if the client has seen a message that
+    /// is recent enough then.
+    pub async fn command(&self, line: String, seen: u64) -> Answer {
+        ask(&self.commands, line, self.hub.deadline(self.number, seen)?).await
     }
 
     /// Types `hold` before all waiting commands. A lost machine gets it when it is back.
-    async fn hold(&self) -> Answer {
-        ask(&self.holds, HOLD.to_owned(), Moment::default()).await
+    pub async fn hold(&self) -> Answer {
+        self.hub.hold(self.number);
+        ask(&self.holds, HOLD.to_owned(), Moment::NEVER).await
     }
 }
 
@@ -112,18 +111,14 @@ async fn ask(lines: &mpsc::Sender<Asked>, line: String, deadline: Moment) -> Ans
     timeout(ANSWER_TIME, answer).await.map_err(|_| NoAnswer::Silent)?.unwrap_or(Err(NoAnswer::Busy))
 }
 
-/// Sends an answer to its clients, if they are still there.
-fn answer(askers: impl IntoIterator<Item = oneshot::Sender<Answer>>, answer: &Answer) {
-    for asker in askers {
-        let _ = asker.send(answer.clone());
-    }
-}
-
 struct Talk {
     number: usize,
     name: String,
     hub: Arc<Hub>,
     tell: Tell,
+    connection: Connection,
+    commands: mpsc::Receiver<Asked>,
+    holds: mpsc::Receiver<Asked>,
     /// The clients that wait for the answer to a command, by its number in the session. Several may wait for a `hold`.
     askers: HashMap<u64, Vec<oneshot::Sender<Answer>>>,
     /// The lines of the answer in progress.
@@ -131,77 +126,60 @@ struct Talk {
 }
 
 impl Talk {
-    fn new(number: usize, name: String, hub: Arc<Hub>, tell: Tell) -> Self {
-        Self { number, name, hub, tell, askers: HashMap::new(), answer: Vec::new() }
-    }
-
-    fn run(
-        mut self,
-        mut connection: Connection,
-        mut commands: mpsc::Receiver<Asked>,
-        mut holds: mpsc::Receiver<Asked>,
-    ) {
-        while self.turn(&mut connection, &mut commands, &mut holds) {
-            if !connection.session.is_open() {
-                thread::sleep(PAUSE);
-            }
-        }
+    fn new(
+        number: usize,
+        name: String,
+        hub: Arc<Hub>,
+        tell: Tell,
+        open: Opener,
+        [commands, holds]: [mpsc::Receiver<Asked>; 2],
+    ) -> Self {
+        let mut connection = Connection::waiting_for(open);
+        (connection.session.keeps_hold, connection.session.keeps_events) = (true, true);
+        Self { number, name, hub, tell, connection, commands, holds, askers: HashMap::new(), answer: Vec::new() }
     }
 
     /// Returns false when the machine is dropped.
-    fn turn(
-        &mut self,
-        connection: &mut Connection,
-        commands: &mut mpsc::Receiver<Asked>,
-        holds: &mut mpsc::Receiver<Asked>,
-    ) -> bool {
-        let session = &mut connection.session;
+    fn turn(&mut self) -> bool {
         // Holds are read before commands. So all commands sent before a hold are dropped by it.
-        let to_hold: Vec<_> = std::iter::from_fn(|| holds.try_recv().ok()).collect();
+        let to_hold: Vec<_> = std::iter::from_fn(|| self.holds.try_recv().ok()).collect();
         loop {
-            match commands.try_recv() {
-                Ok(asked) => self.order(session, asked),
+            match self.commands.try_recv() {
+                Ok(asked) => self.ask(asked),
                 Err(TryRecvError::Empty) => break,
                 Err(TryRecvError::Disconnected) => return false,
             }
         }
-        for asked in to_hold {
-            self.hold(session, asked);
-        }
-        for happening in connection.turn(self.hub.now()) {
+        to_hold.into_iter().for_each(|asked| self.ask(asked));
+        for happening in self.connection.turn(self.hub.now()) {
             self.take(happening);
         }
         true
     }
 
-    fn order(&mut self, session: &mut Session, asked: Asked) {
-        if !session.is_connected() {
-            // A command to a lost machine must not wait for it.
-            answer([asked.asker], &Err(NoAnswer::Lost(self.why_lost())));
-        } else if let Some(number) = session.command(&asked.line, asked.deadline) {
-            self.askers.insert(number, vec![asked.asker]);
-        } else {
-            answer([asked.asker], &Err(NoAnswer::Busy));
+    /// Hands a line to the session. A lost machine gets `hold` when it is back, and no other line. Its client does not
+    /// wait for that.
+    fn ask(&mut self, Asked { line, deadline, asker }: Asked) {
+        let session = &mut self.connection.session;
+        let is_connected = session.is_connected();
+        let number = match line.as_str() {
+            HOLD => Some(session.hold()),
+            line if is_connected => session.command(line, deadline),
+            _ => None,
+        };
+        let why = match number {
+            Some(number) if is_connected => return self.askers.entry(number).or_default().push(asker),
+            _ if is_connected => NoAnswer::Busy,
+            _ => NoAnswer::Lost(self.hub.why_lost(self.number).unwrap_or("the machine is not there".to_owned())),
+        };
+        let _ = asker.send(Err(why));
+    }
+
+    /// Ends a command. Its clients may be gone.
+    fn end(&mut self, number: u64, answer: &Answer) {
+        for asker in self.askers.remove(&number).unwrap_or_default() {
+            let _ = asker.send(answer.clone());
         }
-    }
-
-    fn hold(&mut self, session: &mut Session, asked: Asked) {
-        let number = session.hold();
-        if session.is_connected() {
-            self.askers.entry(number).or_default().push(asked.asker);
-        } else {
-            // It is typed when the machine is back. Its sender does not wait for that.
-            answer([asked.asker], &Err(NoAnswer::Lost(self.why_lost())));
-        }
-    }
-
-    fn why_lost(&self) -> String {
-        self.hub.why_lost(self.number).unwrap_or_else(|| "the machine is not there".to_owned())
-    }
-
-    /// Ends a command.
-    fn end(&mut self, number: u64, ended: &Answer) {
-        answer(self.askers.remove(&number).unwrap_or_default(), ended);
     }
 
     fn take(&mut self, happening: Happening) {
@@ -270,7 +248,6 @@ mod tests {
     use link::{LinkError, Wire};
     use rig::ScriptedBoard;
     use serde_json::Value;
-    use tokio::runtime;
     use tokio::time::sleep;
 
     /// A connected machine.
@@ -295,77 +272,67 @@ mod tests {
 
     /// Types a command with a deadline that a busy computer meets.
     async fn type_soon(machine: &Machine, line: &str) -> Answer {
-        machine.command(line.to_owned(), Moment::now().after(Duration::from_secs(60))).await
+        ask(&machine.commands, line.to_owned(), Moment::now().after(Duration::from_secs(60))).await
     }
 
     fn ok() -> Answer {
         Ok(vec!["ok".to_owned()])
     }
 
-    fn run(test: impl Future<Output = ()>) {
-        runtime::Builder::new_current_thread().enable_time().build().unwrap().block_on(test);
+    #[tokio::test]
+    async fn hold_drops_waiting_commands_and_is_typed_once_for_all_clients() {
+        let (machine, _, board) = machine().await;
+        let others = async {
+            until(|| board.typed() == ["events on", "silence"]).await;
+            let answers = tokio::join!(type_soon(&machine, "start"), machine.hold(), machine.hold());
+            assert_eq!(answers, (Err(Stale::Held.into()), ok(), ok()));
+        };
+        // It does not wait for the answer in progress. The first `ok` is taken for that.
+        let answered_later = async {
+            until(|| board.typed() == ["events on", "silence", "hold"]).await;
+            board.say(b"ok\n");
+        };
+        let (before, (), ()) = tokio::join!(type_soon(&machine, "silence"), others, answered_later);
+        assert_eq!(before, ok());
+        assert_eq!(board.typed(), ["events on", "silence", "hold"]);
     }
 
-    #[test]
-    fn hold_drops_waiting_commands_and_is_typed_once_for_all_clients() {
-        run(async {
-            let (machine, _, board) = machine().await;
-            let others = async {
-                until(|| board.typed() == ["events on", "silence"]).await;
-                let answers = tokio::join!(type_soon(&machine, "start"), machine.hold(), machine.hold());
-                assert_eq!(answers, (Err(Stale::Held.into()), ok(), ok()));
-            };
-            // It does not wait for the answer in progress. The first `ok` is taken for that.
-            let answered_later = async {
-                until(|| board.typed() == ["events on", "silence", "hold"]).await;
-                board.say(b"ok\n");
-            };
-            let (before, (), ()) = tokio::join!(type_soon(&machine, "silence"), others, answered_later);
-            assert_eq!(before, ok());
-            assert_eq!(board.typed(), ["events on", "silence", "hold"]);
-        });
+    #[tokio::test]
+    async fn a_page_gets_everything_when_it_connects_and_then_the_changes_also_if_a_client_turns_the_events_off() {
+        let (machine, hub, board) = machine().await;
+        let there = || serde_json::from_str::<Value>(&hub.listen().0[0].text).unwrap();
+        until(|| there()["status"].is_string()).await;
+        let known = there();
+        assert!(known["is"] == "there" && known["version"].is_string() && known["examples"].is_array(), "{known}");
+        let shows = |known: &Value, value: &str| known["settings"].to_string().contains(value);
+        assert!(shows(&known, "k=3 "));
+        let (_, mut early) = hub.listen();
+        assert_eq!(type_soon(&machine, "set k 5").await, ok());
+        until(|| shows(&there(), "k=5 ")).await;
+        let told = std::iter::from_fn(|| early.try_recv().ok());
+        assert!(
+            told.into_iter()
+                .any(|message| message.text.contains(r#""is":"settings""#) && message.text.contains("k=5 "))
+        );
+        assert_eq!(type_soon(&machine, "events off").await, ok());
+        until(|| board.typed() == ["events on", "set k 5", "events off", "events on"]).await;
     }
 
-    #[test]
-    fn a_page_gets_everything_when_it_connects_and_then_the_changes_also_if_a_client_turns_the_events_off() {
-        run(async {
-            let (machine, hub, board) = machine().await;
-            let there = || serde_json::from_str::<Value>(&hub.listen().0[0].text).unwrap();
-            until(|| there()["status"].is_string()).await;
-            let known = there();
-            assert!(known["is"] == "there" && known["version"].is_string() && known["examples"].is_array(), "{known}");
-            let shows = |known: &Value, value: &str| known["settings"].to_string().contains(value);
-            assert!(shows(&known, "k=3 "));
-            let (_, mut early) = hub.listen();
-            assert_eq!(type_soon(&machine, "set k 5").await, ok());
-            until(|| shows(&there(), "k=5 ")).await;
-            let told = std::iter::from_fn(|| early.try_recv().ok());
-            assert!(
-                told.into_iter()
-                    .any(|message| message.text.contains(r#""is":"settings""#) && message.text.contains("k=5 "))
-            );
-            assert_eq!(type_soon(&machine, "events off").await, ok());
-            until(|| board.typed() == ["events on", "set k 5", "events off", "events on"]).await;
-        });
-    }
-
-    #[test]
-    fn of_the_commands_to_a_lost_machine_only_hold_is_typed_when_it_is_back() {
-        run(async {
-            let (machine, hub, board) = machine().await;
-            let pulled = async {
-                until(|| board.typed() == ["events on", "silence"]).await;
-                board.plug(false);
-            };
-            let (before, ()) = tokio::join!(type_soon(&machine, "silence"), pulled);
-            assert!(matches!(&before, Err(NoAnswer::Unknown(why)) if why.contains("the port is gone")), "{before:?}");
-            for typed in [type_soon(&machine, "start").await, machine.hold().await] {
-                assert!(matches!(typed, Err(NoAnswer::Lost(_))), "{typed:?}");
-            }
-            board.plug(true);
-            until(|| hub.why_lost(0).is_none()).await;
-            assert_eq!(type_soon(&machine, "clear").await, ok());
-            assert_eq!(board.typed(), ["events on", "silence", "hold", "events on", "clear"]);
-        });
+    #[tokio::test]
+    async fn of_the_commands_to_a_lost_machine_only_hold_is_typed_when_it_is_back() {
+        let (machine, hub, board) = machine().await;
+        let pulled = async {
+            until(|| board.typed() == ["events on", "silence"]).await;
+            board.plug(false);
+        };
+        let (before, ()) = tokio::join!(type_soon(&machine, "silence"), pulled);
+        assert!(matches!(&before, Err(NoAnswer::Unknown(why)) if why.contains("the port is gone")), "{before:?}");
+        for typed in [type_soon(&machine, "start").await, machine.hold().await] {
+            assert!(matches!(typed, Err(NoAnswer::Lost(_))), "{typed:?}");
+        }
+        board.plug(true);
+        until(|| hub.why_lost(0).is_none()).await;
+        assert_eq!(type_soon(&machine, "clear").await, ok());
+        assert_eq!(board.typed(), ["events on", "silence", "hold", "events on", "clear"]);
     }
 }

@@ -1,5 +1,4 @@
-//! The page's three files, read from their folder or included in a release, and the form for the code, which is always
-//! included.
+//! The page's three files, read from their folder or included in a release.
 
 use axum::body::Bytes;
 use std::fs;
@@ -42,13 +41,6 @@ impl Page {
     pub fn inside() -> Option<Self> {
         INSIDE.map(|files| Self(files.map(Bytes::from_static)))
     }
-}
-
-/// The form for the code.
-pub(crate) mod form {
-    pub const HTML: &str = include_str!("pair/pair.html");
-    pub const CSS: &str = include_str!("pair/pair.css");
-    pub const JS: &str = include_str!("pair/pair.js");
 }
 
 #[cfg(test)]

@@ -13,10 +13,10 @@ use subtle::ConstantTimeEq;
 const ALPHABET: &[u8; 32] = b"0123456789ABCDEFGHJKMNPQRSTVWXYZ";
 
 /// Characters in a code.
-pub const CODE_LENGTH: usize = 8;
+const CODE_LENGTH: usize = 8;
 
 /// Bytes in a token.
-pub const TOKEN_LENGTH: usize = 32;
+const TOKEN_LENGTH: usize = 32;
 
 /// Wrong codes after which codes are refused for some time.
 const TRIES: u32 = 5;

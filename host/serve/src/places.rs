@@ -66,8 +66,7 @@ pub struct Place {
 impl Places {
     /// A place for a new connection.
     pub fn take(&self, address: IpAddr) -> Place {
-        let place =
-            Place { places: self.clone(), lost: Arc::new(Notify::new()), may_come: AtomicBool::new(true) };
+        let place = Place { places: self.clone(), lost: Arc::new(Notify::new()), may_come: AtomicBool::new(true) };
         self.0.lock().enter(place.taken(Stage::Opening, Client::Address(address)));
         place
     }

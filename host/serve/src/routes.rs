@@ -15,10 +15,11 @@
 use super::door::Door;
 use super::hub::{Hub, Message};
 use super::machine::{Machine, NoAnswer, Tell};
-use super::page::{Page, form};
-use super::pairing::{Pairing, TOKEN_LENGTH, Token, Try, hexadecimal};
+use super::page::Page;
+use super::pairing::{Pairing, Try, hexadecimal};
 use super::places::{Client, Place, Stage};
-use super::rules::{self, Forbidden, Order, Reach};
+use super::random;
+use super::rules::{self, Forbidden, Reach};
 use axum::Extension;
 use axum::Router;
 use axum::body::{Body, Bytes, to_bytes};
@@ -100,8 +101,8 @@ pub fn routes(served: Arc<Served>) -> Router {
     for (path, media, content) in [
         ("/page.css", "text/css; charset=utf-8", css),
         ("/page.js", "text/javascript; charset=utf-8", js),
-        ("/pair.css", "text/css; charset=utf-8", form::CSS.into()),
-        ("/pair.js", "text/javascript; charset=utf-8", form::JS.into()),
+        ("/pair.css", "text/css; charset=utf-8", include_str!("pair/pair.css").into()),
+        ("/pair.js", "text/javascript; charset=utf-8", include_str!("pair/pair.js").into()),
     ] {
         routes = routes.route(path, get(move || async move { ([(CONTENT_TYPE, media)], content) }));
     }
@@ -165,7 +166,7 @@ fn cookies(headers: &HeaderMap) -> impl Iterator<Item = &str> {
 /// The page, or the form for the code.
 async fn front(State(served): State<Arc<Served>>, Extension(visitor): Extension<Visitor>, uri: Uri) -> Response {
     if visitor.known.is_none() {
-        return Html(form::HTML).into_response();
+        return Html(include_str!("pair/pair.html")).into_response();
     }
     // This tells the page that it is connected to a machine.
     match uri.query() {
@@ -187,10 +188,9 @@ async fn pair(
     let tried = served.pairing.lock().try_code(&typed, Instant::now());
     match tried {
         Try::Right => {
-            let mut token: Token = [0; TOKEN_LENGTH];
-            if getrandom::fill(&mut token).is_err() {
+            let Ok(token) = random() else {
                 return (StatusCode::INTERNAL_SERVER_ERROR, "the system has no randomness to give\n").into_response();
-            }
+            };
             let paired = served.pairing.lock().pair(token);
             (served.tell)(&format!("{address} is paired now. Paired in all: {paired}."));
             let cookie = format!("{COOKIE_NAME}={}; HttpOnly; SameSite=Strict; Path=/", hexadecimal(&token));
@@ -241,21 +241,19 @@ async fn command(
         return refused(StatusCode::NOT_FOUND, "there is no such machine");
     };
     let Ok(line) = String::from_utf8(body.into()) else { return no_line() };
-    let order = match rules::allow(&line, visitor.door.reach) {
-        Ok(order) => order,
+    match rules::allow(&line, visitor.door.reach) {
+        Ok(()) => {}
         Err(Forbidden::NoLine) => return no_line(),
         Err(why) => return refused(StatusCode::FORBIDDEN, why),
+    }
+    let answer = if link::is_hold(&line) {
+        visitor.enter(Stage::Holding);
+        machine.hold().await
+    } else {
+        let seen = headers.get(SEEN).and_then(|seen| seen.to_str().ok()?.parse().ok());
+        let Some(seen) = seen else { return refused(StatusCode::PRECONDITION_REQUIRED, NO_KNOWLEDGE) };
+        machine.command(line, seen).await
     };
-    let seen = headers.get(SEEN).and_then(|seen| seen.to_str().ok()?.parse().ok());
-    let seen = match (order, seen) {
-        (Order::Hold, _) => {
-            visitor.enter(Stage::Holding);
-            0
-        }
-        (Order::Type, Some(seen)) => seen,
-        (Order::Type, None) => return refused(StatusCode::PRECONDITION_REQUIRED, NO_KNOWLEDGE),
-    };
-    let answer = machine.take(&served.hub, order, line, seen).await;
     match answer {
         Ok(lines) => (lines.join("\n") + "\n").into_response(),
         Err(why @ NoAnswer::Stale(_)) => refused(StatusCode::PRECONDITION_FAILED, why),
@@ -272,11 +270,7 @@ const NO_KNOWLEDGE: &str = "send the `id` of the last message of /events as the 
 async fn hold_all(State(served): State<Arc<Served>>, Extension(visitor): Extension<Visitor>) -> impl IntoResponse {
     visitor.enter(Stage::Holding);
     let since = Instant::now();
-    let hub = &served.hub;
-    let holds = served.machines.iter().map(|machine| async move {
-        let answer = machine.take(hub, Order::Hold, String::new(), 0).await;
-        (answer, since.elapsed())
-    });
+    let holds = served.machines.iter().map(|machine| async move { (machine.hold().await, since.elapsed()) });
     let (mut machines, mut last_ms) = (Vec::new(), None);
     for (Machine { name, .. }, (answer, time)) in served.machines.iter().zip(join_all(holds).await) {
         let error = match answer {
@@ -355,25 +349,21 @@ fn heard(hub: &Arc<Hub>) -> impl Stream<Item = Message> + use<> {
 mod tests {
     use super::*;
     use std::pin::pin;
-    use tokio::runtime;
 
-    #[test]
-    fn a_page_that_is_too_far_behind_gets_a_last_message_and_may_connect_again() {
-        let runtime = runtime::Builder::new_current_thread().enable_time().build().unwrap();
-        runtime.block_on(async {
-            let hub = Arc::new(Hub::new(1, 5000, Box::new(link::moment::Moment::now)));
-            let mut page = pin!(heard(&hub).map(|message| message.text));
-            for number in 0..1000 {
-                hub.event(0, &number.to_string());
-            }
-            assert!(page.next().await.unwrap().contains("lost"));
-            assert_eq!(page.next().await.as_deref(), Some(r#"{"is":"dropped"}"#));
-            assert_eq!(page.next().await, None);
-            let mut page = pin!(heard(&hub).map(|message| message.text));
-            assert!(page.next().await.unwrap().contains("lost"));
-            assert_eq!(page.next().await.as_deref(), Some(r#"{"is":"beat"}"#));
-            hub.there(0, "0.2.0", &[], &[]);
-            assert!(page.next().await.unwrap().contains("there"));
-        });
+    #[tokio::test]
+    async fn a_page_that_is_too_far_behind_gets_a_last_message_and_may_connect_again() {
+        let hub = Arc::new(Hub::new(1, 5000, Box::new(link::moment::Moment::now)));
+        let mut page = pin!(heard(&hub).map(|message| message.text));
+        for number in 0..1000 {
+            hub.event(0, &number.to_string());
+        }
+        assert!(page.next().await.unwrap().contains("lost"));
+        assert_eq!(page.next().await.as_deref(), Some(r#"{"is":"dropped"}"#));
+        assert_eq!(page.next().await, None);
+        let mut page = pin!(heard(&hub).map(|message| message.text));
+        assert!(page.next().await.unwrap().contains("lost"));
+        assert_eq!(page.next().await.as_deref(), Some(r#"{"is":"beat"}"#));
+        hub.there(0, "0.2.0", &[], &[]);
+        assert!(page.next().await.unwrap().contains("there"));
     }
 }

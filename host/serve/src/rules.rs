@@ -21,15 +21,6 @@ pub enum Reach {
     },
 }
 
-/// How to handle a line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Order {
-    /// Hold, before all waiting commands.
-    Hold,
-    /// Type it after the previous commands have been answered.
-    Type,
-}
-
 /// Why a line is not passed on to the machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum Forbidden {
@@ -55,66 +46,36 @@ pub enum Forbidden {
     ChangesWire,
 }
 
-/// Decides whether and how a line may be typed from there.
+/// Decides whether a line may be typed from there.
 ///
 /// # Errors
 /// Why it is not allowed, and where it is.
-pub fn allow(line: &str, reach: Reach) -> Result<Order, Forbidden> {
+pub fn allow(line: &str, reach: Reach) -> Result<(), Forbidden> {
     // The machine does not answer a line without a word.
     if !link::is_command(line) || line.trim().is_empty() {
         return Err(Forbidden::NoLine);
     }
+    // Every client may hold. The machine itself reports errors in a line of the operator's.
+    let Reach::Lan { may_start } = reach else { return Ok(()) };
     if link::is_hold(line) {
-        return Ok(Order::Hold);
+        return Ok(());
     }
-    match (reach, link::command(line).map(|command| command.action)) {
-        // The machine itself reports errors in the line.
-        (Reach::Here, _) => Ok(Order::Type),
-        (Reach::Lan { .. }, Err(_)) => Err(Forbidden::Unknown),
-        (Reach::Lan { may_start }, Ok(action)) => match why_not(action) {
-            Some(Forbidden::NoStart) if may_start => Ok(Order::Type),
-            Some(why) => Err(why),
-            None => Ok(Order::Type),
-        },
-    }
+    let action = link::command(line).map_err(|_| Forbidden::Unknown)?.action;
+    why_not(action).filter(|&why| !(may_start && why == Forbidden::NoStart)).map_or(Ok(()), Err)
 }
 
 /// Why a command is refused over the network. Every new command must be added here.
 fn why_not(action: Action) -> Option<Forbidden> {
+    use Action::*;
     match action {
-        Action::Help
-        | Action::Explain
-        | Action::Status
-        | Action::GetAll
-        | Action::Get
-        | Action::Hold
-        | Action::EventsOn
-        | Action::Examples
-        | Action::Dump
-        | Action::Version => None,
+        Help | Explain | Status | GetAll | Get | Hold | EventsOn | Examples | Dump | Version => None,
         // A client that has not seen the fault must not clear a latched alarm.
-        Action::Start | Action::Clear => Some(Forbidden::NoStart),
-        Action::StartNow => Some(Forbidden::Unseen),
-        Action::CalibrateServo
-        | Action::ServoIn
-        | Action::ServoOut
-        | Action::Servo
-        | Action::TestRow
-        | Action::TestWatchdog => Some(Forbidden::MovesTool),
-        Action::Set
-        | Action::Save
-        | Action::Revert
-        | Action::Defaults
-        | Action::CalibrateStart
-        | Action::Calibrate
-        | Action::LabelPlant
-        | Action::LabelWeed
-        | Action::Feature
-        | Action::TeachPlant
-        | Action::TeachWeed
-        | Action::Forget
-        | Action::ForgetAll => Some(Forbidden::ChangesMachine),
-        Action::EventsOff | Action::PlotOn | Action::PlotOff | Action::PlotTeleplot => Some(Forbidden::ChangesWire),
+        Start | Clear => Some(Forbidden::NoStart),
+        StartNow => Some(Forbidden::Unseen),
+        CalibrateServo | ServoIn | ServoOut | Servo | TestRow | TestWatchdog => Some(Forbidden::MovesTool),
+        Set | Save | Revert | Defaults | CalibrateStart | Calibrate | LabelPlant | LabelWeed | Feature | TeachPlant
+        | TeachWeed | Forget | ForgetAll => Some(Forbidden::ChangesMachine),
+        EventsOff | PlotOn | PlotOff | PlotTeleplot => Some(Forbidden::ChangesWire),
     }
 }
 
@@ -171,12 +132,12 @@ mod tests {
         for (line, why) in lines() {
             let started = why.filter(|why| *why != Forbidden::NoStart);
             for (reach, why) in [(Reach::Here, None), (WATCHING, why), (STARTING, started)] {
-                assert_eq!(allow(line, reach), why.map_or(Ok(Order::Type), Err), "{line:?} from {reach:?}");
+                assert_eq!(allow(line, reach), why.map_or(Ok(()), Err), "{line:?} from {reach:?}");
             }
         }
         for line in ["hold", " hold", "hold   ", "HOLD", "Hold", "hold.", "HOLD !"] {
             for reach in [Reach::Here, WATCHING, STARTING] {
-                assert_eq!(allow(line, reach), Ok(Order::Hold), "{line:?} from {reach:?}");
+                assert!(link::is_hold(line) && allow(line, reach) == Ok(()), "{line:?} from {reach:?}");
             }
         }
     }
@@ -224,9 +185,9 @@ mod tests {
         for line in ["starts", "start later", "start now now", "set k", "launch", "help me", "servo", "\u{1}"] {
             assert!(allow(line, STARTING).is_err(), "{line:?}");
         }
-        assert_eq!(allow("launch", Reach::Here), Ok(Order::Type));
+        assert_eq!(allow("launch", Reach::Here), Ok(()));
         // The machine reads capital letters as small ones.
-        assert_eq!(allow("START", STARTING), Ok(Order::Type));
+        assert_eq!(allow("START", STARTING), Ok(()));
         assert_eq!(allow("START", WATCHING), allow("start", WATCHING));
         assert!(allow("Set margin_mm 5", STARTING).is_err());
     }

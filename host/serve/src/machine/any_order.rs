@@ -72,9 +72,6 @@ struct World {
     machine: Arc<Machine>,
     board: ScriptedBoard,
     talk: Talk,
-    connection: Connection,
-    commands: mpsc::Receiver<Asked>,
-    holds: mpsc::Receiver<Asked>,
     pages: [Page; 2],
     requests: Vec<Request>,
     pending: Vec<(usize, Option<usize>, Pending)>,
@@ -95,12 +92,9 @@ impl World {
         let board = ScriptedBoard::plugged_in();
         let port = board.clone();
         let open = move || Ok(Wire::over(port.open().ok_or(LinkError::Absent("it".to_owned()))?, false));
-        let mut connection = Connection::waiting_for(open);
-        (connection.session.keeps_hold, connection.session.keeps_events) = (true, true);
-        let (send_commands, commands) = mpsc::channel(WAITING);
-        let (send_holds, holds) = mpsc::channel(WAITING);
-        let machine = Machine { name: "uno".to_owned(), number: 0, commands: send_commands, holds: send_holds };
-        let talk = Talk::new(0, "uno".to_owned(), Arc::clone(&hub), Arc::new(|_| {}));
+        let (machine, asked) = Machine::new(0, "uno".to_owned(), Arc::clone(&hub));
+        let (name, tell) = ("uno".to_owned(), Arc::new(|_: &str| {}));
+        let talk = Talk::new(0, name, Arc::clone(&hub), tell, Box::new(open), asked);
         let page = || Page { messages: None, coming: VecDeque::new(), seen: 0, sleeps_until: 0, hold_at: None };
         Self {
             random: ChaCha8Rng::seed_from_u64(seed),
@@ -110,9 +104,6 @@ impl World {
             machine: Arc::new(machine),
             board,
             talk,
-            connection,
-            commands,
-            holds,
             pages: [page(), page()],
             requests: Vec::new(),
             pending: Vec::new(),
@@ -176,13 +167,13 @@ impl World {
         let mut arrived: Vec<Request> = arrived;
         arrived.sort_by_key(|request| request.arrives);
         for Request { page, start, line, seen, .. } in arrived {
-            let (hub, machine) = (Arc::clone(&self.hub), Arc::clone(&self.machine));
-            let order = if line == HOLD { Order::Hold } else { Order::Type };
-            let answer = async move { machine.take(&hub, order, line, seen).await };
+            let machine = Arc::clone(&self.machine);
+            let answer =
+                async move { if line == HOLD { machine.hold().await } else { machine.command(line, seen).await } };
             self.pending.push((page, start, Box::pin(answer)));
             self.poll();
         }
-        self.talk.turn(&mut self.connection, &mut self.commands, &mut self.holds);
+        self.talk.turn();
         self.poll();
         self.deliver();
     }
