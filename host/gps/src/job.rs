@@ -26,6 +26,7 @@ use link::{Class, Mode};
 use logbook::follower::{Followed, Follower};
 use logbook::log::{Entry, Kind};
 use std::ops::Range;
+use strum::IntoStaticStr;
 
 /// The parameters of reading a log.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,7 +44,8 @@ impl Default for Wanted {
 }
 
 /// The kinds of event.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
 pub enum EventKind {
     /// A detection that the beam has seen.
     Detection {
@@ -77,15 +79,9 @@ impl EventKind {
             Self::Detection { class: Class::Plant, .. } => "plant",
             Self::Detection { class: Class::Weed, .. } => "weed",
             Self::Detection { class: Class::Unknown, .. } => "unknown",
-            Self::Guarded => "guarded",
             Self::Label(Class::Plant) => "label_plant",
             Self::Label(_) => "label_weed",
-            Self::SwingOut => "swing_out",
-            Self::SwingIn => "swing_in",
-            Self::Alarm => "alarm",
-            Self::Restart => "restart",
-            Self::WheelSpun => "wheel_spun",
-            Self::WheelGap => "wheel_gap",
+            other => other.into(),
         }
     }
 }
@@ -181,49 +177,26 @@ pub struct Job {
     pub spun_m: f64,
 }
 
-/// A restart at work that is not certain yet.
-#[derive(Default)]
-struct Restart {
-    /// Index of its stretch and its event.
-    at: Option<(usize, usize)>,
-    /// Whether the link is there again.
-    is_connected: bool,
-    cause: Option<String>,
-}
-
 impl Job {
     /// Reads a record.
     pub fn read(log: &[Entry], wanted: &Wanted) -> Self {
         let antenna = wanted.antenna.or_else(|| antenna_of(log)).unwrap_or_default();
         let mut job = Self { antenna, ..Self::default() };
         let mut receiver = Receiver::new(antenna.error_m());
-        let mut follower = Follower::default();
-        let mut reading = Reading::default();
-        let mut restart = Restart::default();
-        let mut last_ms = 0;
-        for entry in log {
+        let (mut follower, mut reading) = (Follower::default(), Reading::default());
+        for (at, entry) in log.iter().enumerate() {
             let tick_mm = follower.tick_mm();
             let followed = follower.take(entry);
-            let is_cut = match &followed {
-                Followed::Linked => true,
-                Followed::Status(_, goes_on) => !goes_on,
-                _ => false,
-            };
+            let is_cut = matches!(followed, Followed::Linked | Followed::Status(_, false));
             // An earlier time: the log was closed, and opened again.
-            if is_cut || entry.time_ms < last_ms {
-                let was_at_work = reading.last_status.as_ref().is_some_and(|status| status.mode == Mode::Work);
-                if matches!(followed, Followed::Linked) && was_at_work {
-                    reading.restart(entry);
-                    restart =
-                        Restart { at: Some((job.stretches.len(), reading.events.len() - 1)), ..Restart::default() };
+            if is_cut || reading.time_ms.as_ref().is_some_and(|range| entry.time_ms < range.end) {
+                if matches!(followed, Followed::Linked) {
+                    reading.restart(entry, &log[at..]);
                 }
                 job.end(&mut receiver, &mut reading, entry, wanted);
             }
-            last_ms = entry.time_ms;
-            restart.is_connected |= entry.kind == Kind::Connected;
             match followed {
                 Followed::Status(status, _) => {
-                    job.judge(&mut restart, status.mode != Mode::Work);
                     if let Some(mm) = follower.mm(status.position) {
                         let m = mm / 1000.0;
                         receiver.rolled(entry.time_ms as f64, m, f64::from(status.speed_mm_s));
@@ -235,18 +208,15 @@ impl Job {
                 Followed::Answered(command, true) => reading.label(&command),
                 _ => {}
             }
-            match entry.kind {
-                Kind::Gps | Kind::GpsDamaged => {
-                    let heard = receiver.take(entry.time_ms as f64, &entry.text);
-                    job.heard(heard, &mut reading, entry);
-                }
+            let heard = match entry.kind {
+                Kind::Gps | Kind::GpsDamaged => receiver.take(entry.time_ms as f64, &entry.text),
                 Kind::GpsLost => {
                     job.unplugged += 1;
-                    job.heard(receiver.silent(), &mut reading, entry);
+                    receiver.silent()
                 }
-                _ if restart.at.is_some() => restart.cause = cause(&entry.text).or(restart.cause),
-                _ => {}
-            }
+                _ => Heard::default(),
+            };
+            job.heard(heard, &mut reading, entry);
             if follower.tick_mm() != tick_mm && !reading.wheel.is_empty() {
                 // The machine's position stays.
                 let last_status = reading.last_status.take();
@@ -262,30 +232,9 @@ impl Job {
         if let Some(last) = log.last() {
             job.end(&mut receiver, &mut reading, last, wanted);
         }
-        let is_certain = restart.is_connected;
-        job.judge(&mut restart, is_certain);
         job.counts = receiver.counts();
         job.midnight_ms = receiver.midnight_ms();
         job
-    }
-
-    /// Ends a stretch.
-    fn end(&mut self, receiver: &mut Receiver, reading: &mut Reading, entry: &Entry, wanted: &Wanted) {
-        self.heard(receiver.end(), reading, entry);
-        receiver.wheel_lost();
-        self.close(reading, wanted);
-    }
-
-    /// Keeps the mark of a restart, or removes it: the machine has worked on without its link.
-    fn judge(&mut self, restart: &mut Restart, is_one: bool) {
-        let Restart { at: Some((stretch, event)), cause, .. } = std::mem::take(restart) else { return };
-        let Some(stretch) = self.stretches.get_mut(stretch) else { return };
-        if is_one {
-            let cause = cause.map_or(String::new(), |cause| format!(" ({cause})"));
-            stretch.events[event].text = format!("restarted{cause} while at work: not weeded from here");
-        } else {
-            stretch.events.remove(event);
-        }
     }
 
     fn heard(&mut self, heard: Heard, reading: &mut Reading, entry: &Entry) {
@@ -299,8 +248,10 @@ impl Job {
         }
     }
 
-    /// Gives the events of a stretch their positions, and begins another one.
-    fn close(&mut self, reading: &mut Reading, wanted: &Wanted) {
+    /// Ends a stretch: gives its events their positions, and begins another one.
+    fn end(&mut self, receiver: &mut Receiver, reading: &mut Reading, entry: &Entry, wanted: &Wanted) {
+        self.heard(receiver.end(), reading, entry);
+        receiver.wheel_lost();
         let read = std::mem::take(reading);
         if read.wheel.is_empty() {
             return;
@@ -350,9 +301,10 @@ impl Job {
             let (from, to) = (&stations[spin.start], &stations[spin.end]);
             let rolled_m = (to.distance_m - from.distance_m).abs();
             self.spun_m += rolled_m;
-            let at = wheel.partition_point(|rolled| rolled.time_ms < to.time_ms).min(wheel.len() - 1);
+            let at = wheel.partition_point(|rolled| rolled.time_ms < to.fix.time_ms).min(wheel.len() - 1);
             let text = format!("the wheel rolled {rolled_m:.1} m on the spot");
-            Event::mark(EventKind::WheelSpun, text, wheel[at].line, to.time_ms, from.distance_m.midpoint(to.distance_m))
+            let at_m = from.distance_m.midpoint(to.distance_m);
+            Event::mark(EventKind::WheelSpun, text, wheel[at].line, to.fix.time_ms, at_m)
         };
         spins.iter().map(event).collect()
     }
@@ -381,13 +333,6 @@ fn lines(distance_m: &Range<f64>, find: impl Fn(f64) -> Result<Found, Missing>) 
     // A single position is no line.
     lines.retain(|line| line.len() > 1);
     lines
-}
-
-/// The reset's cause in a line, such as the greeting.
-fn cause(line: &str) -> Option<String> {
-    let (_, rest) = line.split_once("reset by ")?;
-    let word: String = rest.chars().take_while(|letter| letter.is_alphanumeric() || *letter == '_').collect();
-    (!word.is_empty()).then_some(word)
 }
 
 /// The last offsets of beam and tool in a log.

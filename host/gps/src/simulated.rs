@@ -103,9 +103,8 @@ impl SimulatedReceiver {
     }
 
     fn metres(&self, distance_m: f64, beside: Offset) -> Metres {
-        let (east, north) = self.setup.direction_degrees.to_radians().sin_cos();
-        let forward = Metres { east, north };
-        forward.times(distance_m + beside.ahead_m).plus(forward.turned_right().times(beside.right_m))
+        let forward = Metres::toward(self.setup.direction_degrees);
+        forward * distance_m + beside.along(forward)
     }
 
     /// The bytes up to this time, in seconds since the Uno was powered up. `distance_m` returns the distance travelled at a
@@ -127,8 +126,7 @@ impl SimulatedReceiver {
     fn sentences(&mut self, moment_s: f64, distance_m: f64) -> [String; 2] {
         let Offset { ahead_m, right_m } = self.setup.beam;
         let mut at = self.metres(distance_m, Offset { ahead_m: -ahead_m, right_m: -right_m });
-        let error_m = self.setup.error_mm / 1000.0;
-        at = at.plus(Metres { east: self.normal(), north: self.normal() }.times(error_m));
+        at += Metres { east: self.normal(), north: self.normal() } * (self.setup.error_mm / 1000.0);
         let mut has_fix = true;
         if let Some(trouble) = &self.setup.trouble {
             let second = moment_s.rem_euclid(trouble.every_s);
