@@ -52,7 +52,7 @@ const STEP_STAYS_MS: f64 = 2000.0;
 const STEP_JITTER_MS: f64 = 300.0;
 
 /// A moment, and the values received for it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Moment {
     arrived_ms: f64,
     utc_ms: i64,
@@ -184,31 +184,17 @@ impl Receiver {
             self.complete();
             return self.no_fix();
         };
-        if let Some(moment) = &self.moment {
-            let before_ms = moment.utc_ms.rem_euclid(DAY_MS);
-            if before_ms == time_ms && arrived_ms - moment.arrived_ms < LONGEST_DELAY_MS {
-                return self.add(report);
-            }
+        let before_ms = self.moment.map(|moment| moment.utc_ms.rem_euclid(DAY_MS));
+        let is_near = |moment: Moment| arrived_ms - moment.arrived_ms < LONGEST_DELAY_MS;
+        if before_ms != Some(time_ms) || !self.moment.is_some_and(is_near) {
             // Past midnight forward, or back over it for a receiver that has only now found the time.
+            let before_ms = before_ms.unwrap_or(time_ms);
             self.days += i64::from(time_ms < before_ms - DAY_MS / 2) - i64::from(time_ms > before_ms + DAY_MS / 2);
+            self.complete();
+            let (utc_ms, wheel) = (self.days * DAY_MS + time_ms, self.wheel);
+            let new = Moment { arrived_ms, utc_ms, wheel, digit_m: f64::INFINITY, is_valid: true, ..Moment::default() };
+            self.moment = Some(new);
         }
-        self.complete();
-        let utc_ms = self.days * DAY_MS + time_ms;
-        self.moment = Some(Moment {
-            arrived_ms,
-            utc_ms,
-            place: None,
-            digit_m: f64::INFINITY,
-            is_valid: true,
-            quality: None,
-            wheel: self.wheel,
-            is_over: false,
-        });
-        self.add(report);
-    }
-
-    /// Adds the values of a sentence to its moment.
-    fn add(&mut self, report: Report) {
         if let Some(day) = report.day {
             *self.first_days.entry(day - self.days).or_default() += 1;
         }
@@ -462,31 +448,22 @@ mod tests {
         assert_eq!(receiver.counts(), Counts { fixes: 25, losses: 1, jumps: 0, damaged: 0 });
     }
 
-    /// As [`rolling`], with the fixes of some seconds two metres off.
-    fn off(seconds: std::ops::Range<i64>) -> (Vec<Heard>, Receiver) {
+    #[test]
+    fn fixes_that_jump_are_marked_and_used_only_if_they_stay_there() {
         let plane = Plane::around(FIELD);
-        rolling(FIELD, 0, 30, |second, lines| {
-            let place = plane.place(Metres { east: 0.5 * second as f64, north: 2.0 });
-            if seconds.contains(&second) { [gga(1000 * second, place), rmc(1000 * second, place)] } else { lines }
-        })
-    }
-
-    #[test]
-    fn fixes_that_jump_and_come_back_are_marked_and_not_used() {
-        let (heard, receiver) = off(10..13);
-        assert_eq!(receiver.counts(), Counts { fixes: 27, losses: 0, jumps: 3, damaged: 0 });
-        let jumped = marks(&heard).into_iter().filter(|mark| matches!(mark, Mark::Jumped(jump) if jump.far_m >= 2.0));
-        assert_eq!(jumped.count(), 3);
-        assert!(fixes(&heard).iter().all(|fix| fix.track == 0));
-    }
-
-    #[test]
-    fn fixes_that_stay_where_they_have_jumped_to_are_another_track() {
-        let (heard, receiver) = off(10..30);
-        assert_eq!(receiver.counts(), Counts { fixes: 30, losses: 0, jumps: 11, damaged: 0 });
-        assert_eq!(marks(&heard).last(), Some(&Mark::Stayed));
-        let tracks: Vec<u32> = fixes(&heard).iter().map(|fix| fix.track).collect();
-        assert_eq!(tracks, [vec![0; 10], vec![1; 20]].concat());
+        for (off, jumps, tracks) in [(10..13, 3, vec![0; 27]), (10..30, 11, [vec![0; 10], vec![1; 20]].concat())] {
+            let (heard, receiver) = rolling(FIELD, 0, 30, |second, lines| {
+                let place = plane.place(Metres { east: 0.5 * second as f64, north: 2.0 });
+                if off.contains(&second) { [gga(1000 * second, place), rmc(1000 * second, place)] } else { lines }
+            });
+            let fixes = tracks.len() as u64;
+            assert_eq!(receiver.counts(), Counts { fixes, jumps, ..Counts::default() });
+            let marks = marks(&heard);
+            let jumped = |mark: &&Mark| matches!(mark, Mark::Jumped(jump) if jump.far_m >= 2.0);
+            assert_eq!(marks.iter().filter(jumped).count() as u64, jumps);
+            assert_eq!(marks.last() == Some(&Mark::Stayed), tracks.contains(&1));
+            assert_eq!(self::fixes(&heard).iter().map(|fix| fix.track).collect::<Vec<_>>(), tracks);
+        }
     }
 
     #[test]

@@ -162,9 +162,7 @@ impl World {
                 self.send(number, None, HOLD.to_owned());
             }
         }
-        let (arrived, coming) = std::mem::take(&mut self.requests).into_iter().partition(|one| now >= one.arrives);
-        self.requests = coming;
-        let mut arrived: Vec<Request> = arrived;
+        let mut arrived: Vec<Request> = self.requests.extract_if(.., |request| now >= request.arrives).collect();
         arrived.sort_by_key(|request| request.arrives);
         for Request { page, start, line, seen, .. } in arrived {
             let machine = Arc::clone(&self.machine);
@@ -181,26 +179,21 @@ impl World {
     /// Takes the answers that are there.
     fn poll(&mut self) {
         let mut context = Context::from_waker(Waker::noop());
-        let mut waiting = Vec::new();
-        for (page, start, mut answer) in std::mem::take(&mut self.pending) {
-            let Poll::Ready(answer) = answer.as_mut().poll(&mut context) else {
-                waiting.push((page, start, answer));
-                continue;
-            };
-            match (start, &answer) {
-                (Some(start), Ok(_)) => self.starts[start] = Start::Answered,
+        let Self { pending, starts, pages, random, .. } = self;
+        pending.retain_mut(|(page, start, answer)| {
+            let Poll::Ready(answer) = answer.as_mut().poll(&mut context) else { return true };
+            match (*start, answer) {
+                (Some(start), Ok(_)) => starts[start] = Start::Answered,
                 (Some(start), Err(NoAnswer::Stale(_) | NoAnswer::Lost(_) | NoAnswer::Busy)) => {
-                    self.starts[start] = Start::NotSent;
+                    starts[start] = Start::NotSent;
                 }
-                (Some(start), Err(NoAnswer::Unknown(_) | NoAnswer::Silent)) => self.starts[start] = Start::Unknown,
+                (Some(start), Err(NoAnswer::Unknown(_) | NoAnswer::Silent)) => starts[start] = Start::Unknown,
                 // The answer to HOLD, or to `set`: the page cannot tell more of a lost answer, and sends HOLD again.
-                (None, Ok(lines)) if lines.len() == 1 && self.random.random_ratio(9, 10) => {
-                    self.pages[page].hold_at = None;
-                }
+                (None, Ok(lines)) if lines.len() == 1 && random.random_ratio(9, 10) => pages[*page].hold_at = None,
                 _ => {}
             }
-        }
-        self.pending = waiting;
+            false
+        });
     }
 
     /// Brings messages to the pages.
