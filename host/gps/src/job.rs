@@ -18,7 +18,7 @@ mod reading;
 use self::reading::{Reading, Rolled};
 use crate::antenna::Antenna;
 use crate::plane::Place;
-use crate::receiver::{Counts, Fix, Heard, Jump, Mark, Receiver};
+use crate::receiver::{Counts, Fix, Jump, Mark, Receiver};
 use crate::track::{Basis, Found, Missing, Offset, Track};
 use crate::wheel::{self, Ratio};
 use link::settings::Setting;
@@ -208,15 +208,15 @@ impl Job {
                 Followed::Answered(command, true) => reading.label(&command),
                 _ => {}
             }
-            let heard = match entry.kind {
+            match entry.kind {
                 Kind::Gps | Kind::GpsDamaged => receiver.take(entry.time_ms as f64, &entry.text),
                 Kind::GpsLost => {
                     job.unplugged += 1;
-                    receiver.silent()
+                    receiver.silent();
                 }
-                _ => Heard::default(),
-            };
-            job.heard(heard, &mut reading, entry);
+                _ => {}
+            }
+            job.hear(&mut receiver, &mut reading, entry);
             if follower.tick_mm() != tick_mm && !reading.wheel.is_empty() {
                 // The machine's position stays.
                 let last_status = reading.last_status.take();
@@ -237,7 +237,8 @@ impl Job {
         job
     }
 
-    fn heard(&mut self, heard: Heard, reading: &mut Reading, entry: &Entry) {
+    fn hear(&mut self, receiver: &mut Receiver, reading: &mut Reading, entry: &Entry) {
+        let heard = std::mem::take(&mut receiver.heard);
         for fix in heard.fixes {
             reading.fixes.push(Fix { time_ms: fix.time_ms - self.antenna.delay_ms, ..fix });
         }
@@ -250,7 +251,8 @@ impl Job {
 
     /// Ends a stretch: gives its events their positions, and begins another one.
     fn end(&mut self, receiver: &mut Receiver, reading: &mut Reading, entry: &Entry, wanted: &Wanted) {
-        self.heard(receiver.end(), reading, entry);
+        receiver.end();
+        self.hear(receiver, reading, entry);
         receiver.wheel_lost();
         let read = std::mem::take(reading);
         if read.wheel.is_empty() {
@@ -261,12 +263,7 @@ impl Job {
         // When a shorter delay is found, a later fix may get an earlier time.
         fixes.sort_by(|(_, one), (_, other)| one.time_ms.total_cmp(&other.time_ms));
         let track = Track::through(&fixes, wanted.longest_outage_m);
-        let find = |distance_m: f64, recorded_ms: u64, offset: Offset| match &track {
-            Some(track) => track.find(distance_m, recorded_ms as f64, offset),
-            None => Err(Missing::NoFixBefore),
-        };
-        let marks =
-            read.gaps().chain(track.iter().flat_map(|track| self.compare(track, &read.wheel))).collect::<Vec<_>>();
+        let marks: Vec<Event> = read.gaps().chain(self.compare(&track, &read.wheel)).collect();
         let (beam, tool) = (self.antenna.beam(), self.antenna.tool(read.beam_to_tool_mm));
         let (mut events, mut ground) = (read.events, read.ground);
         events.extend(marks);
@@ -275,19 +272,19 @@ impl Job {
                 EventKind::Detection { .. } | EventKind::Guarded | EventKind::Label(_) => beam,
                 _ => tool,
             };
-            event.found = find(event.distance_m, event.time_ms, offset);
-            if let (EventKind::Restart, Err(Missing::NoFixBehind), Some(track)) = (event.kind, event.found, &track) {
+            event.found = track.find(event.distance_m, event.time_ms as f64, offset);
+            if let (EventKind::Restart, Err(Missing::NoFixBehind)) = (event.kind, event.found) {
                 // The track ends at the last fix, a little before the machine's last position.
                 let last_m = track.stations().last().map_or(0.0, |station| station.distance_m);
-                let on_m = event.distance_m - last_m;
-                let at_end = find(last_m, event.time_ms, offset);
-                event.found =
-                    at_end.map(|found| Found { error_m: found.error_m + on_m, basis: Basis::Interpolated, ..found });
+                let error_m = event.distance_m - last_m;
+                let at_end = track.find(last_m, event.time_ms as f64, offset);
+                let beyond = |end: Found| Found { error_m: end.error_m + error_m, basis: Basis::Interpolated, ..end };
+                event.found = at_end.map(beyond);
             }
         }
         for ground in ground.iter_mut().filter(|ground| ground.did != Did::Rolled) {
-            let until_ms = ground.time_ms.end;
-            ground.lines = lines(&ground.distance_m, |distance_m| find(distance_m, until_ms, tool));
+            let until_ms = ground.time_ms.end as f64;
+            ground.lines = lines(&ground.distance_m, |distance_m| track.find(distance_m, until_ms, tool));
         }
         self.stretches.push(Stretch { events, ground, time_ms: read.time_ms.unwrap_or_default() });
     }

@@ -8,7 +8,7 @@ use derive_more::{Add, AddAssign, Div, Mul, Sub};
 use geographiclib_rs::{DirectGeodesic, Geodesic, InverseGeodesic};
 
 /// A position on the earth, on the ellipsoid of WGS84.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Place {
     /// Degrees to the north, -90 to 90.
     pub latitude: f64,

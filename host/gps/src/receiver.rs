@@ -95,8 +95,8 @@ pub struct Receiver {
     /// The fix's standard deviation, if the user knows it.
     error_m: Option<f64>,
     counts: Counts,
-    /// The results that are not returned yet.
-    heard: Heard,
+    /// The fixes and marks since the caller took them last.
+    pub heard: Heard,
     moment: Option<Moment>,
     /// Midnights since the first line.
     days: i64,
@@ -151,7 +151,7 @@ impl Receiver {
     }
 
     /// Takes a line that came at this time of the log's clock.
-    pub fn take(&mut self, time_ms: f64, line: &str) -> Heard {
+    pub fn take(&mut self, time_ms: f64, line: &str) {
         // A log of an earlier version has lines with several sentences, or with something in front.
         for sentence in Finder::all(line.as_bytes()) {
             match Line::parse(&sentence) {
@@ -160,22 +160,18 @@ impl Receiver {
                 Line::Damaged => self.counts.damaged += 1,
             }
         }
-        std::mem::take(&mut self.heard)
     }
 
     /// The end of the log: the last moment's fix is complete.
-    pub fn end(&mut self) -> Heard {
+    pub fn end(&mut self) {
         self.complete();
         self.release();
-        std::mem::take(&mut self.heard)
     }
 
     /// The receiver is gone or silent.
-    pub fn silent(&mut self) -> Heard {
-        self.complete();
-        self.release();
+    pub fn silent(&mut self) {
+        self.end();
         self.no_fix();
-        std::mem::take(&mut self.heard)
     }
 
     fn report(&mut self, arrived_ms: f64, report: Report) {
@@ -348,34 +344,20 @@ mod tests {
 
     /// A receiver that rolls half a metre a second to the east of a position. It sends a fix once a second from a
     /// moment on. `change` gets the number of each second and its two lines.
-    fn rolling(
-        from: Place,
-        start_ms: i64,
-        seconds: i64,
-        change: impl Fn(i64, [String; 2]) -> [String; 2],
-    ) -> (Vec<Heard>, Receiver) {
+    fn rolling(from: Place, start_ms: i64, seconds: i64, change: impl Fn(i64, [String; 2]) -> [String; 2]) -> Receiver {
         let plane = Plane::around(from);
         let mut receiver = Receiver::new(None);
-        let mut heard = Vec::new();
         for second in 0..seconds {
             let utc_ms = start_ms + 1000 * second;
             let place = plane.place(Metres { east: 0.5 * second as f64, north: 0.0 });
             let time_ms = 1000.0 * second as f64;
             receiver.rolled(time_ms, 0.5 * second as f64, 500.0);
             for line in change(second, [gga(utc_ms, place), rmc(utc_ms, place)]) {
-                heard.push(receiver.take(time_ms + 80.0, &line));
+                receiver.take(time_ms + 80.0, &line);
             }
         }
-        heard.push(receiver.end());
-        (heard, receiver)
-    }
-
-    fn fixes(heard: &[Heard]) -> Vec<Fix> {
-        heard.iter().flat_map(|heard| &heard.fixes).copied().collect()
-    }
-
-    fn marks(heard: &[Heard]) -> Vec<Mark> {
-        heard.iter().flat_map(|heard| &heard.marks).copied().collect()
+        receiver.end();
+        receiver
     }
 
     proptest! {
@@ -385,11 +367,11 @@ mod tests {
         ) {
             let longitude = [180.0 - off.abs(), -180.0 + off.abs(), off, 100.0][near];
             let start_ms = (DAY + 1) * DAY_MS + 1000 * start_s;
-            let (heard, receiver) = rolling(Place { latitude, longitude }, start_ms, 40, |_, lines| lines);
-            let fixes = fixes(&heard);
+            let receiver = rolling(Place { latitude, longitude }, start_ms, 40, |_, lines| lines);
+            let Heard { fixes, marks } = &receiver.heard;
             prop_assert_eq!(fixes.len(), 40);
             prop_assert_eq!(receiver.counts(), Counts { fixes: 40, ..Counts::default() });
-            prop_assert_eq!(marks(&heard), vec![Mark::Found(Quality::Rtk)]);
+            prop_assert_eq!(marks, &[Mark::Found(Quality::Rtk)]);
             let midnight_ms = receiver.midnight_ms().expect("RMC has a date");
             for (second, pair) in fixes.windows(2).enumerate() {
                 prop_assert_eq!(midnight_ms + pair[0].utc_ms, start_ms + 1000 * second as i64);
@@ -411,8 +393,8 @@ mod tests {
             // A checksum has 8 bits, so of 256 seams one looks like a whole line.
             let is_known = |line: &str| stream.lines().any(|whole| whole == line) || Line::parse(line) == Line::Damaged;
             prop_assume!(cut.lines().all(is_known));
-            let heard: Vec<Heard> = cut.lines().enumerate().map(|(at, line)| receiver.take(500.0 * at as f64, line)).collect();
-            for fix in fixes(&heard) {
+            cut.lines().enumerate().for_each(|(at, line)| receiver.take(500.0 * at as f64, line));
+            for fix in &receiver.heard.fixes {
                 prop_assert!(fix.place.distance_m(FIELD) < 1e-3);
             }
             prop_assert!(receiver.counts().damaged <= 1);
@@ -425,12 +407,11 @@ mod tests {
         let cases = [(20, 1.0, [0.0, 300.0, 35.0, 1900.0], 1e-6), (7200, 1.0001, [0.0; 4], 12.1)];
         for (seconds, pace, late_ms, within_ms) in cases {
             let mut receiver = Receiver::new(None);
-            let line = |second: i64| {
+            for second in 0..seconds {
                 let due_ms = 1000.0 * pace * second as f64 + 70.0;
-                receiver.take(due_ms + late_ms[second as usize % late_ms.len()], &gga(1000 * second, FIELD))
-            };
-            let heard: Vec<Heard> = (0..seconds).map(line).collect();
-            for fix in fixes(&heard) {
+                receiver.take(due_ms + late_ms[second as usize % late_ms.len()], &gga(1000 * second, FIELD));
+            }
+            for fix in &receiver.heard.fixes {
                 let true_ms = pace * fix.utc_ms as f64 + 70.0;
                 assert!((fix.time_ms - true_ms).abs() <= within_ms, "{fix:?}");
             }
@@ -443,8 +424,8 @@ mod tests {
             let none = framed(&simulated::rmc(1000 * second, None));
             if (10..15).contains(&second) { [none.clone(), none] } else { lines }
         };
-        let (heard, receiver) = rolling(FIELD, 0, 30, lost);
-        assert_eq!(marks(&heard), [Mark::Found(Quality::Rtk), Mark::Lost, Mark::Found(Quality::Rtk)]);
+        let receiver = rolling(FIELD, 0, 30, lost);
+        assert_eq!(receiver.heard.marks, [Mark::Found(Quality::Rtk), Mark::Lost, Mark::Found(Quality::Rtk)]);
         assert_eq!(receiver.counts(), Counts { fixes: 25, losses: 1, jumps: 0, damaged: 0 });
     }
 
@@ -452,26 +433,24 @@ mod tests {
     fn fixes_that_jump_are_marked_and_used_only_if_they_stay_there() {
         let plane = Plane::around(FIELD);
         for (off, jumps, tracks) in [(10..13, 3, vec![0; 27]), (10..30, 11, [vec![0; 10], vec![1; 20]].concat())] {
-            let (heard, receiver) = rolling(FIELD, 0, 30, |second, lines| {
+            let receiver = rolling(FIELD, 0, 30, |second, lines| {
                 let place = plane.place(Metres { east: 0.5 * second as f64, north: 2.0 });
                 if off.contains(&second) { [gga(1000 * second, place), rmc(1000 * second, place)] } else { lines }
             });
-            let fixes = tracks.len() as u64;
-            assert_eq!(receiver.counts(), Counts { fixes, jumps, ..Counts::default() });
-            let marks = marks(&heard);
+            assert_eq!(receiver.counts(), Counts { fixes: tracks.len() as u64, jumps, ..Counts::default() });
+            let Heard { fixes, marks } = &receiver.heard;
             let jumped = |mark: &&Mark| matches!(mark, Mark::Jumped(jump) if jump.far_m >= 2.0);
             assert_eq!(marks.iter().filter(jumped).count() as u64, jumps);
             assert_eq!(marks.last() == Some(&Mark::Stayed), tracks.contains(&1));
-            assert_eq!(self::fixes(&heard).iter().map(|fix| fix.track).collect::<Vec<_>>(), tracks);
+            assert_eq!(fixes.iter().map(|fix| fix.track).collect::<Vec<_>>(), tracks);
         }
     }
 
     #[test]
     fn a_receiver_without_a_fix_from_the_beginning_is_marked_so() {
         let mut receiver = Receiver::new(None);
-        let heard: Vec<Heard> =
-            (0..5).map(|second| receiver.take(1000.0 * f64::from(second), &framed("GPRMC,,V,,,,,,,,,,N"))).collect();
-        assert_eq!(marks(&heard), [Mark::Lost]);
+        (0..5).for_each(|second| receiver.take(1000.0 * f64::from(second), &framed("GPRMC,,V,,,,,,,,,,N")));
+        assert_eq!(receiver.heard.marks, [Mark::Lost]);
         assert_eq!(receiver.midnight_ms(), None);
     }
 }

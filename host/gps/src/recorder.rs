@@ -6,7 +6,7 @@
 //! [`Recorder::lost`].
 
 use crate::antenna::Antenna;
-use crate::receiver::{Heard, Receiver};
+use crate::receiver::Receiver;
 use crate::sentence::{Finder, Line};
 use link::session::Happening;
 use logbook::follower::{Distance, tick_mm};
@@ -85,9 +85,8 @@ impl Recorder {
     /// It is gone; why.
     pub fn lost(&mut self, why: &str) -> Lines {
         self.heard_ms = None;
-        let mut lines = vec![(Kind::GpsLost, why.to_owned())];
-        lines.extend(marks(&self.receiver.silent()));
-        lines
+        self.receiver.silent();
+        [(Kind::GpsLost, why.to_owned())].into_iter().chain(self.marks()).collect()
     }
 
     /// Takes received bytes, or none.
@@ -109,9 +108,9 @@ impl Recorder {
                     Kind::Gps
                 }
             };
-            let heard = self.receiver.take(time_ms as f64, &sentence);
+            self.receiver.take(time_ms as f64, &sentence);
             lines.push((kind, sentence));
-            lines.extend(marks(&heard));
+            lines.extend(self.marks());
         }
         let is_past =
             |since_ms: Option<u64>, limit_ms| since_ms.is_some_and(|ms| time_ms.saturating_sub(ms) > limit_ms);
@@ -130,10 +129,11 @@ impl Recorder {
     pub fn counts(&self) -> crate::receiver::Counts {
         self.receiver.counts()
     }
-}
 
-fn marks(heard: &Heard) -> Lines {
-    heard.marks.iter().map(|mark| (Kind::GpsMark, mark.to_string())).collect()
+    fn marks(&mut self) -> impl Iterator<Item = (Kind, String)> + use<> {
+        let heard = std::mem::take(&mut self.receiver.heard);
+        heard.marks.into_iter().map(|mark| (Kind::GpsMark, mark.to_string()))
+    }
 }
 
 #[cfg(test)]

@@ -122,9 +122,9 @@ pub struct Track {
 }
 
 impl Track {
-    /// The track through these fixes in order of time, each with the wheel's distance in metres. `None` without a fix.
-    pub fn through(fixes: &[(f64, Fix)], longest_outage_m: f64) -> Option<Self> {
-        let plane = Plane::around(fixes.first()?.1.place);
+    /// The track through these fixes in order of time, each with the wheel's distance in metres.
+    pub fn through(fixes: &[(f64, Fix)], longest_outage_m: f64) -> Self {
+        let plane = Plane::around(fixes.first().map_or(Place::default(), |(_, fix)| fix.place));
         let mut stations: Vec<Station> = Vec::with_capacity(fixes.len());
         let mut intervals = Vec::new();
         for &(distance_m, fix) in fixes {
@@ -146,7 +146,7 @@ impl Track {
         }
         intervals.sort_by(f64::total_cmp);
         let interval_ms = intervals.get(intervals.len() / 2).copied().unwrap_or(f64::INFINITY);
-        Some(Self { plane, stations, interval_ms, longest_outage_m })
+        Self { plane, stations, interval_ms, longest_outage_m }
     }
 
     pub(crate) fn stations(&self) -> &[Station] {
@@ -345,7 +345,7 @@ mod tests {
     }
 
     fn track(fixes: &[(f64, Fix)]) -> Track {
-        Track::through(fixes, 20.0).expect("there are fixes")
+        Track::through(fixes, 20.0)
     }
 
     fn every_half_metre(count: u32) -> impl Iterator<Item = f64> {
@@ -390,7 +390,7 @@ mod tests {
             let fixes = driven(every_half_metre(60), eastward);
             let kept: Vec<_> =
                 fixes.iter().enumerate().filter(|(at, _)| !(lost..lost + length).contains(&(*at as u32))).map(|(_, it)| *it).collect();
-            let track = Track::through(&kept, 10.0).expect("there are fixes");
+            let track = Track::through(&kept, 10.0);
             let found = track.find(distance_m, 2000.0 * distance_m, Offset::default());
             let end_m = 0.5 * f64::from(lost + length);
             let has_no_end = end_m > 29.5;
@@ -418,7 +418,7 @@ mod tests {
         assert_eq!(track.find(-0.1, 5000.0, Offset::default()), Err(Missing::NoFixBefore));
         assert_eq!(track.find(4.6, 9000.0, Offset::default()), Err(Missing::NoFixBehind));
         assert_eq!(track.find(1.0, -1500.0, Offset::default()), Err(Missing::NoFixBefore));
-        assert!(Track::through(&[], 20.0).is_none());
+        assert_eq!(Track::through(&[], 20.0).find(0.0, 0.0, Offset::default()), Err(Missing::NoFixBefore));
     }
 
     #[test]
@@ -478,7 +478,7 @@ mod tests {
             fixes[at].1.place = plane.place(Metres { east: 0.0, north });
         }
         fixes.iter_mut().for_each(|(_, fix)| fix.error_m = 0.5);
-        let track = Track::through(&fixes, 20.0).expect("there are fixes");
+        let track = track(&fixes);
         assert!(off_m(track.find(0.0, 4000.0, Offset::default()), Metres { east: 0.0, north: 0.2 }) < 1e-4);
         let beside = Offset { ahead_m: 1.0, right_m: 0.0 };
         assert_eq!(track.find(0.25, 4000.0, beside), Err(Missing::NoHeading));

@@ -230,21 +230,18 @@ proptest! {
         let utc_ms = |number: i64| 1_781_432_100_000 + 200 * number - if number >= at { 1000 * by_s } else { 0 };
         let plane = Plane::around(Place { latitude: 51.5, longitude: 0.1 });
         let mut receiver = gps::receiver::Receiver::new(None);
-        let (mut fixes, mut steps) = (Vec::new(), 0);
-        let mut keep = |heard: gps::receiver::Heard| {
-            fixes.extend(heard.fixes);
-            steps += heard.marks.iter().filter(|mark| matches!(mark, Mark::Stepped(_))).count();
-        };
         for number in 0..60 {
             // Lines come up to 90 ms late, and none around the step if it is lost.
             let time_ms = 200.0 * number as f64 + 30.0 * (number % 4) as f64;
             receiver.rolled(time_ms, SPEED / 1000.0 * time_ms / 1000.0, SPEED);
             let place = plane.place(Metres::toward(73.0) * (0.2 * SPEED / 1000.0 * number as f64));
             if !is_lost || !(at - 6..at + 2).contains(&number) {
-                keep(receiver.take(time_ms, &framed(&gps::simulated::gga(utc_ms(number), Some((place, Quality::Rtk))))));
+                receiver.take(time_ms, &framed(&gps::simulated::gga(utc_ms(number), Some((place, Quality::Rtk)))));
             }
         }
-        keep(receiver.end());
+        receiver.end();
+        let gps::receiver::Heard { fixes, marks } = receiver.heard;
+        let steps = marks.iter().filter(|mark| matches!(mark, Mark::Stepped(_))).count();
         prop_assert_eq!((fixes.len(), steps), (if is_lost { 52 } else { 60 }, 1));
         for fix in fixes {
             let metres = plane.metres(fix.place).length();

@@ -250,12 +250,15 @@ mod tests {
     use serde_json::Value;
     use tokio::time::sleep;
 
+    pub(super) fn opener(board: &ScriptedBoard) -> Opener {
+        let port = board.clone();
+        Box::new(move || Ok(Wire::over(port.open().ok_or(LinkError::Absent("it".to_owned()))?, false)))
+    }
+
     /// A connected machine.
     async fn machine() -> (Machine, Arc<Hub>, ScriptedBoard) {
         let (hub, board) = (Arc::new(Hub::new(1, 0, Box::new(Moment::now))), ScriptedBoard::plugged_in());
-        let port = board.clone();
-        let open = move || Ok(Wire::over(port.open().ok_or(LinkError::Absent("it".to_owned()))?, false));
-        let machine = Machine::start(0, "uno".to_owned(), Box::new(open), Arc::clone(&hub), Arc::new(|_| {}));
+        let machine = Machine::start(0, "uno".to_owned(), opener(&board), Arc::clone(&hub), Arc::new(|_| {}));
         until(|| hub.why_lost(0).is_none()).await;
         (machine, hub, board)
     }

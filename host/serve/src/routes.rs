@@ -251,7 +251,10 @@ async fn command(
         machine.hold().await
     } else {
         let seen = headers.get(SEEN).and_then(|seen| seen.to_str().ok()?.parse().ok());
-        let Some(seen) = seen else { return refused(StatusCode::PRECONDITION_REQUIRED, NO_KNOWLEDGE) };
+        let Some(seen) = seen else {
+            let right = "send the `id` of the last message of /events as the header Weeder-Seen, or send `hold`";
+            return refused(StatusCode::PRECONDITION_REQUIRED, right);
+        };
         machine.command(line, seen).await
     };
     match answer {
@@ -261,9 +264,6 @@ async fn command(
         Err(why @ (NoAnswer::Unknown(_) | NoAnswer::Silent)) => refused(StatusCode::GATEWAY_TIMEOUT, why),
     }
 }
-
-/// The error for a command from a client that does not say what it has seen.
-const NO_KNOWLEDGE: &str = "send the `id` of the last message of /events as the header Weeder-Seen, or send `hold`";
 
 /// Holds all machines at once. Every client that is let in may do this. Returns for each machine why it has not obeyed,
 /// or nothing, and the time of the last one that has.

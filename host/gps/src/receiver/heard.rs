@@ -65,7 +65,7 @@ impl fmt::Display for Mark {
     }
 }
 
-/// The results of a line.
+/// The results of some lines.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Heard {
     /// Complete fixes. Several come if earlier fixes had jumped and are accepted after all.

@@ -8,13 +8,12 @@
 
 use super::*;
 use crate::hub::Message;
-use link::{LinkError, Wire};
+use parking_lot::Mutex;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rig::ScriptedBoard;
 use std::collections::VecDeque;
 use std::pin::Pin;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::task::{Context, Poll, Waker};
 use tokio::runtime;
 use tokio::sync::broadcast;
@@ -66,9 +65,8 @@ enum Start {
 
 struct World {
     random: ChaCha8Rng,
-    ms: Arc<AtomicU64>,
-    asleep_ms: Arc<AtomicU64>,
-    hub: Arc<Hub>,
+    /// The present moment.
+    clock: Arc<Mutex<Moment>>,
     machine: Arc<Machine>,
     board: ScriptedBoard,
     talk: Talk,
@@ -82,25 +80,17 @@ struct World {
 
 impl World {
     fn new(seed: u64) -> Self {
-        let (ms, asleep_ms) = (Arc::new(AtomicU64::new(1000)), Arc::new(AtomicU64::new(0)));
-        let (ticking, sleeping) = (Arc::clone(&ms), Arc::clone(&asleep_ms));
-        let clock = move || {
-            let ticking = Duration::from_millis(ticking.load(Ordering::Relaxed));
-            Moment { ticking, calendar: ticking + Duration::from_millis(sleeping.load(Ordering::Relaxed)) }
-        };
-        let hub = Arc::new(Hub::new(1, seed << 20, Box::new(clock)));
+        let clock = Arc::new(Mutex::new(Moment::default().after(Duration::from_secs(1))));
+        let present = Arc::clone(&clock);
+        let hub = Arc::new(Hub::new(1, seed << 20, Box::new(move || *present.lock())));
         let board = ScriptedBoard::plugged_in();
-        let port = board.clone();
-        let open = move || Ok(Wire::over(port.open().ok_or(LinkError::Absent("it".to_owned()))?, false));
         let (machine, asked) = Machine::new(0, "uno".to_owned(), Arc::clone(&hub));
         let (name, tell) = ("uno".to_owned(), Arc::new(|_: &str| {}));
-        let talk = Talk::new(0, name, Arc::clone(&hub), tell, Box::new(open), asked);
+        let talk = Talk::new(0, name, hub, tell, super::tests::opener(&board), asked);
         let page = || Page { messages: None, coming: VecDeque::new(), seen: 0, sleeps_until: 0, hold_at: None };
         Self {
             random: ChaCha8Rng::seed_from_u64(seed),
-            ms,
-            asleep_ms,
-            hub,
+            clock,
             machine: Arc::new(machine),
             board,
             talk,
@@ -112,9 +102,9 @@ impl World {
         }
     }
 
-    /// The time that goes on while the computer sleeps.
+    /// The time in ms that goes on while the computer sleeps.
     fn now(&self) -> u64 {
-        self.ms.load(Ordering::Relaxed) + self.asleep_ms.load(Ordering::Relaxed)
+        self.clock.lock().calendar.as_millis() as u64
     }
 
     /// A delay of the network: short, but for one in a number of cases. The kernel may send a packet again for seconds.
@@ -154,7 +144,8 @@ impl World {
 
     /// A step of the pages, the network and the server.
     fn step(&mut self) {
-        self.ms.fetch_add(STEP_MS, Ordering::Relaxed);
+        let next = self.clock.lock().after(Duration::from_millis(STEP_MS));
+        *self.clock.lock() = next;
         let now = self.now();
         for number in 0..self.pages.len() {
             if self.pages[number].hold_at.is_some_and(|at| now >= at) && now >= self.pages[number].sleeps_until {
@@ -210,7 +201,7 @@ impl World {
                     }
                 }
                 None if now >= page.sleeps_until => {
-                    let (first, later) = self.hub.listen();
+                    let (first, later) = self.machine.hub.listen();
                     page.coming = first.iter().map(|message| (now + delay, message.number)).collect();
                     page.messages = Some(later);
                 }
@@ -239,7 +230,7 @@ fn run(seed: u64) -> [usize; 4] {
     for _ in 0..STEPS {
         match world.random.random_range(0..60) {
             // The computer sleeps.
-            0 => _ = world.asleep_ms.fetch_add(world.random.random_range(0..8000), Ordering::Relaxed),
+            0 => world.clock.lock().calendar += Duration::from_millis(world.random.random_range(0..8000)),
             1 => world.board.plug(false),
             2..6 => world.board.plug(true),
             6..26 => {
