@@ -6,7 +6,7 @@ use super::knowledge::Stale;
 use link::advice;
 use link::connection::{Connection, Opener, PAUSE};
 use link::moment::Moment;
-use link::session::{HOLD, Happening, Session, Unanswered};
+use link::session::{HOLD, Happening, Unanswered};
 use link::settings::other_version;
 use link::{EventLine, Mode};
 use std::collections::HashMap;
