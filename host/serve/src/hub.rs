@@ -3,8 +3,9 @@
 //! Machines write and pages read. No page makes a machine wait: a page that is too slow misses messages, and gets a notice.
 //! The memory does not grow with the number of pages.
 
-use super::knowledge::{Knowledge, Stale};
+use super::knowledge::Knowledge;
 use link::moment::Moment;
+use link::session::Unanswered;
 use link::settings::helps;
 use parking_lot::Mutex;
 use serde_json::{Value, json};
@@ -104,15 +105,15 @@ impl Hub {
     /// The machine is to hold, or holds: commands of senders that do not know this yet are refused.
     pub fn hold(&self, machine: usize) {
         let mut state = self.state.lock();
-        let number = state.knowledge.hold(machine, self.now());
-        self.publish(number, &json!({ "machine": machine, "is": "held" }));
+        let number = self.send(&mut state, &json!({ "machine": machine, "is": "held" }));
+        state.knowledge.hold(machine, number);
     }
 
     /// Until when a command to a machine may be typed, if its sender has seen the message of this number.
     ///
     /// # Errors
     /// If a HOLD has come since, or the message is too old.
-    pub fn deadline(&self, machine: usize, seen: u64) -> Result<Moment, Stale> {
+    pub fn deadline(&self, machine: usize, seen: u64) -> Result<Moment, Unanswered> {
         self.state.lock().knowledge.deadline(machine, seen, self.now())
     }
 
@@ -144,13 +145,12 @@ impl Hub {
     }
 
     /// Sends while the lock is held, so that a page does not get a change twice: its first state may already include it.
-    fn send(&self, state: &mut State, message: &Value) {
-        self.publish(state.knowledge.number(self.now()), message);
-    }
-
-    fn publish(&self, number: u64, message: &Value) {
+    /// Returns the message's number.
+    fn send(&self, state: &mut State, message: &Value) -> u64 {
+        let number = state.knowledge.number(self.now());
         // An error means that no page listens.
         let _ = self.pages.send(Message { number, text: message.to_string().into() });
+        number
     }
 }
 

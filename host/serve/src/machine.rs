@@ -2,7 +2,6 @@
 //! gets all other output. It makes no decisions: [`rules`](super::rules) decides which lines may be typed.
 
 use super::hub::Hub;
-use super::knowledge::Stale;
 use link::advice;
 use link::connection::{Connection, Opener, PAUSE};
 use link::moment::Moment;
@@ -13,7 +12,6 @@ use std::collections::HashMap;
 use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
-use thiserror::Error;
 use tokio::sync::mpsc::error::TryRecvError;
 use tokio::sync::{mpsc, oneshot};
 use tokio::time::timeout;
@@ -31,26 +29,7 @@ const LINES: usize = 1000;
 const ANSWER_TIME: Duration = Duration::from_secs(30);
 
 /// The machine's answer to a line; its last line is `ok`, or begins with `error:`.
-pub type Answer = Result<Vec<String>, NoAnswer>;
-
-/// Why there is no answer to a line.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-pub enum NoAnswer {
-    /// It was not typed.
-    #[error(transparent)]
-    Stale(#[from] Stale),
-    /// It was not typed, because the machine is lost.
-    #[error("{0}")]
-    Lost(String),
-    /// It was not typed.
-    #[error("too much waits for the machine: try again")]
-    Busy,
-    /// It was typed, and the machine is lost.
-    #[error("{0}. The machine may have done this, or may still do it: look at it")]
-    Unknown(String),
-    #[error("the machine does not answer. It may have done this, or may still do it: look at it")]
-    Silent,
-}
+pub type Answer = Result<Vec<String>, Unanswered>;
 
 /// A client's line to type, and where its answer goes.
 struct Asked {
@@ -107,8 +86,13 @@ impl Machine {
 
 async fn ask(lines: &mpsc::Sender<Asked>, line: String, deadline: Moment) -> Answer {
     let (asker, answer) = oneshot::channel();
-    lines.try_send(Asked { line, deadline, asker }).map_err(|_| NoAnswer::Busy)?;
-    timeout(ANSWER_TIME, answer).await.map_err(|_| NoAnswer::Silent)?.unwrap_or(Err(NoAnswer::Busy))
+    lines.try_send(Asked { line, deadline, asker }).map_err(|_| busy())?;
+    let silent = || Unanswered::Unknown("the machine does not answer".to_owned());
+    timeout(ANSWER_TIME, answer).await.map_err(|_| silent())?.unwrap_or_else(|_| Err(busy()))
+}
+
+fn busy() -> Unanswered {
+    Unanswered::NotTyped("too much waits for the machine: try again".to_owned())
 }
 
 struct Talk {
@@ -169,8 +153,8 @@ impl Talk {
         };
         let why = match number {
             Some(number) if is_connected => return self.askers.entry(number).or_default().push(asker),
-            _ if is_connected => NoAnswer::Busy,
-            _ => NoAnswer::Lost(self.hub.why_lost(self.number).unwrap_or("the machine is not there".to_owned())),
+            _ if is_connected => busy(),
+            _ => Unanswered::NotTyped(self.hub.why_lost(self.number).unwrap_or("the machine is not there".to_owned())),
         };
         let _ = asker.send(Err(why));
     }
@@ -224,15 +208,7 @@ impl Talk {
                 let lines = std::mem::take(&mut self.answer);
                 self.end(number, &Ok(lines));
             }
-            Happening::Unanswered { number, why, .. } => {
-                let why = match why {
-                    Unanswered::Late => Stale::Late.into(),
-                    Unanswered::Held => Stale::Held.into(),
-                    Unanswered::NotTyped(why) => NoAnswer::Lost(why),
-                    Unanswered::Unknown(why) => NoAnswer::Unknown(why),
-                };
-                self.end(number, &Err(why));
-            }
+            Happening::Unanswered { number, why, .. } => self.end(number, &Err(why)),
             Happening::Settings(_, shown) => self.hub.know(self.number, "settings", shown.into()),
             Happening::Examples(lines) => self.hub.know(self.number, "examples", lines.into()),
         }
@@ -288,7 +264,7 @@ mod tests {
         let others = async {
             until(|| board.typed() == ["events on", "silence"]).await;
             let answers = tokio::join!(type_soon(&machine, "start"), machine.hold(), machine.hold());
-            assert_eq!(answers, (Err(Stale::Held.into()), ok(), ok()));
+            assert_eq!(answers, (Err(Unanswered::Held), ok(), ok()));
         };
         // It does not wait for the answer in progress. The first `ok` is taken for that.
         let answered_later = async {
@@ -329,9 +305,9 @@ mod tests {
             board.plug(false);
         };
         let (before, ()) = tokio::join!(type_soon(&machine, "silence"), pulled);
-        assert!(matches!(&before, Err(NoAnswer::Unknown(why)) if why.contains("the port is gone")), "{before:?}");
+        assert!(matches!(&before, Err(Unanswered::Unknown(why)) if why.contains("the port is gone")), "{before:?}");
         for typed in [type_soon(&machine, "start").await, machine.hold().await] {
-            assert!(matches!(typed, Err(NoAnswer::Lost(_))), "{typed:?}");
+            assert!(matches!(typed, Err(Unanswered::NotTyped(_))), "{typed:?}");
         }
         board.plug(true);
         until(|| hub.why_lost(0).is_none()).await;

@@ -14,7 +14,7 @@
 
 use super::door::Door;
 use super::hub::{Hub, Message};
-use super::machine::{Machine, NoAnswer, Tell};
+use super::machine::{Machine, Tell};
 use super::page::Page;
 use super::pairing::{Pairing, Try, hexadecimal};
 use super::places::{Client, Place, Stage};
@@ -35,6 +35,7 @@ use axum::response::{Html, IntoResponse, Response};
 use axum::routing::{get, post};
 use futures_util::future::join_all;
 use futures_util::stream::{self, Stream, StreamExt};
+use link::session::Unanswered;
 use parking_lot::Mutex;
 use std::convert::Infallible;
 use std::error::Error;
@@ -259,9 +260,26 @@ async fn command(
     };
     match answer {
         Ok(lines) => (lines.join("\n") + "\n").into_response(),
-        Err(why @ NoAnswer::Stale(_)) => refused(StatusCode::PRECONDITION_FAILED, why),
-        Err(why @ (NoAnswer::Lost(_) | NoAnswer::Busy)) => refused(StatusCode::SERVICE_UNAVAILABLE, why),
-        Err(why @ (NoAnswer::Unknown(_) | NoAnswer::Silent)) => refused(StatusCode::GATEWAY_TIMEOUT, why),
+        Err(why) => {
+            let (status, why) = unanswered(why);
+            refused(status, why)
+        }
+    }
+}
+
+/// The status and the words for a line without an answer.
+fn unanswered(why: Unanswered) -> (StatusCode, String) {
+    match why {
+        Unanswered::Held => (StatusCode::PRECONDITION_FAILED, "hold came first, so this was not sent".to_owned()),
+        Unanswered::Late => (
+            StatusCode::PRECONDITION_FAILED,
+            "this came more than a second late, so it was not sent: look at the machine, then try again".to_owned(),
+        ),
+        Unanswered::NotTyped(why) => (StatusCode::SERVICE_UNAVAILABLE, why),
+        Unanswered::Unknown(why) => (
+            StatusCode::GATEWAY_TIMEOUT,
+            format!("{why}. The machine may have done this, or may still do it: look at it"),
+        ),
     }
 }
 
@@ -275,7 +293,7 @@ async fn hold_all(State(served): State<Arc<Served>>, Extension(visitor): Extensi
     for (Machine { name, .. }, (answer, time)) in served.machines.iter().zip(join_all(holds).await) {
         let error = match answer {
             Ok(lines) => lines.into_iter().next_back().filter(|line| line.starts_with("error:")),
-            Err(why) => Some(why.to_string()),
+            Err(why) => Some(unanswered(why).1),
         };
         match &error {
             Some(why) => (served.tell)(&format!("{name} has not obeyed HOLD: {why}.")),

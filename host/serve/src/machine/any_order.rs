@@ -175,10 +175,8 @@ impl World {
             let Poll::Ready(answer) = answer.as_mut().poll(&mut context) else { return true };
             match (*start, answer) {
                 (Some(start), Ok(_)) => starts[start] = Start::Answered,
-                (Some(start), Err(NoAnswer::Stale(_) | NoAnswer::Lost(_) | NoAnswer::Busy)) => {
-                    starts[start] = Start::NotSent;
-                }
-                (Some(start), Err(NoAnswer::Unknown(_) | NoAnswer::Silent)) => starts[start] = Start::Unknown,
+                (Some(start), Err(Unanswered::Unknown(_))) => starts[start] = Start::Unknown,
+                (Some(start), Err(_)) => starts[start] = Start::NotSent,
                 // The answer to HOLD, or to `set`: the page cannot tell more of a lost answer, and sends HOLD again.
                 (None, Ok(lines)) if lines.len() == 1 && random.random_ratio(9, 10) => pages[*page].hold_at = None,
                 _ => {}
