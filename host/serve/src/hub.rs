@@ -6,7 +6,6 @@
 use super::knowledge::Knowledge;
 use link::moment::Moment;
 use link::session::Unanswered;
-use link::settings::helps;
 use parking_lot::Mutex;
 use serde_json::{Value, json};
 use std::sync::Arc;
@@ -46,7 +45,9 @@ impl Hub {
     /// This number of machines, before the message with the number `first`.
     pub fn new(machines: usize, first: u64, clock: Clock) -> Self {
         let state = State {
-            machines: (0..machines).map(|machine| lost(machine, "its port is being opened")).collect(),
+            machines: (0..machines)
+                .map(|machine| json!({ "machine": machine, "is": "lost", "why": "its port is being opened" }))
+                .collect(),
             restarted: vec![None; machines],
             knowledge: Knowledge::new(first, machines),
         };
@@ -58,43 +59,20 @@ impl Hub {
         (self.clock)()
     }
 
-    /// The machine is connected: the firmware's version, and the lines that show its settings and examples.
-    pub fn there(&self, machine: usize, version: &str, settings: &[String], examples: &[String]) {
-        let there = json!({
-            "machine": machine,
-            "is": "there",
-            "version": version,
-            "settings": settings,
-            "examples": examples,
-            "help": helps(),
-        });
-        self.change(machine, there);
-    }
-
-    pub fn lost(&self, machine: usize, why: &str) {
-        self.change(machine, lost(machine, why));
-    }
-
-    /// The machine has sent its status as a line, or has new settings or examples, as lines.
-    pub fn know(&self, machine: usize, what: &str, said: Value) {
+    /// Sends what has happened at a machine, as [`Happening::news`](link::session::Happening::news) has it. A page that
+    /// connects later gets the state that follows.
+    pub fn news(&self, machine: usize, mut news: Value) {
+        news["machine"] = machine.into();
         let mut state = self.state.lock();
-        self.send(&mut state, &json!({ "machine": machine, "is": what, "said": said }));
-        if state.machines[machine]["is"] == "there" {
-            state.machines[machine][what] = said;
+        self.send(&mut state, &news);
+        match news["is"].as_str().unwrap_or_default() {
+            "there" | "lost" => state.machines[machine] = news,
+            "restarted" => state.restarted[machine] = Some(news),
+            what @ ("status" | "settings" | "examples") if state.machines[machine]["is"] == "there" => {
+                state.machines[machine][what] = news["said"].clone();
+            }
+            _ => {}
         }
-    }
-
-    /// The machine has sent an event line.
-    pub fn event(&self, machine: usize, line: &str) {
-        self.send(&mut self.state.lock(), &json!({ "machine": machine, "is": "event", "said": line }));
-    }
-
-    /// The machine has restarted at work, with this greeting. Every page shows this until it works again.
-    pub fn restarted(&self, machine: usize, greeting: &str) {
-        let mut state = self.state.lock();
-        let restarted = json!({ "machine": machine, "is": "restarted", "said": greeting });
-        self.send(&mut state, &restarted);
-        state.restarted[machine] = Some(restarted);
     }
 
     /// The machine works.
@@ -138,12 +116,6 @@ impl Hub {
         (messages, self.pages.subscribe())
     }
 
-    fn change(&self, machine: usize, message: Value) {
-        let mut state = self.state.lock();
-        self.send(&mut state, &message);
-        state.machines[machine] = message;
-    }
-
     /// Sends while the lock is held, so that a page does not get a change twice: its first state may already include it.
     /// Returns the message's number.
     fn send(&self, state: &mut State, message: &Value) -> u64 {
@@ -154,13 +126,11 @@ impl Hub {
     }
 }
 
-fn lost(machine: usize, why: &str) -> Value {
-    json!({ "machine": machine, "is": "lost", "why": why })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use link::session::Happening;
+    use link::settings::Settings;
 
     fn read(message: &Message) -> Value {
         serde_json::from_str(&message.text).unwrap()
@@ -169,11 +139,13 @@ mod tests {
     #[test]
     fn a_new_page_gets_the_state_of_all_machines_and_then_the_changes() {
         let hub = Hub::new(2, 5000, Box::new(Moment::now));
-        hub.there(0, "0.2.0", &["k=5".to_owned()], &["field 0".to_owned()]);
-        hub.know(0, "status", "state=hold".into());
-        hub.know(0, "settings", json!(["k=3"]));
+        let (shown, examples) = (vec!["k=5".to_owned()], vec!["field 0".to_owned()]);
+        let there = Happening::Connected { version: "0.2.0".to_owned(), settings: Settings::new(), shown, examples };
+        hub.news(0, there.news());
+        hub.news(0, json!({ "is": "status", "said": "state=hold" }));
+        hub.news(0, json!({ "is": "settings", "said": ["k=3"] }));
         // A lost machine has no status.
-        hub.know(1, "status", "state=work".into());
+        hub.news(1, json!({ "is": "status", "said": "state=work" }));
         let (now, mut later) = hub.listen();
         let mut now: Vec<Value> = now.iter().map(read).collect();
         let help = now[0].as_object_mut().unwrap().remove("help").unwrap();
@@ -191,8 +163,8 @@ mod tests {
         ];
         assert_eq!(now, expected);
         assert_eq!(hub.why_lost(0), None);
-        hub.event(0, "state=work");
-        hub.lost(0, "pulled");
+        hub.news(0, json!({ "is": "event", "said": "state=work" }));
+        hub.news(0, json!({ "is": "lost", "why": "pulled" }));
         let expected = [
             json!({ "machine": 0, "is": "event", "said": "state=work" }),
             json!({ "machine": 0, "is": "lost", "why": "pulled" }),

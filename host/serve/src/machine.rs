@@ -167,26 +167,25 @@ impl Talk {
     }
 
     fn take(&mut self, happening: Happening) {
+        let news = happening.news();
         match happening {
-            Happening::Connected { version, shown, examples, .. } => {
-                self.hub.there(self.number, &version, &shown, &examples);
-                (self.tell)(&format!("{}: weeder {version} is there.", self.name));
+            Happening::Connected { version, shown, .. } => {
+                self.hub.news(self.number, news);
+                self.tell(&format!("weeder {version} is there"));
                 if let Some(other) = other_version(&version, &shown) {
-                    (self.tell)(&format!("{}: {other}.", self.name));
+                    self.tell(&other);
                 }
             }
-            Happening::Started { greeting, while_at_work: Some(cause) } => {
-                (self.tell)(&format!("{}: {}.", self.name, advice::restarted(&cause)));
-                self.hub.restarted(self.number, &greeting);
+            Happening::Started { while_at_work: Some(cause), .. } => {
+                self.hub.news(self.number, news);
+                self.tell(&advice::restarted(&cause));
             }
-            Happening::Started { .. } => {}
             Happening::Lost(why) => {
-                self.hub.lost(self.number, &why);
-                (self.tell)(&format!("{}: {why}.", self.name));
+                self.hub.news(self.number, news);
+                self.tell(&why);
                 self.answer.clear();
             }
-            Happening::Status(_, line) => self.hub.know(self.number, "status", line.into()),
-            Happening::Event(event, line) => {
+            Happening::Event(event, _) => {
                 // Its switch and its alarms are HOLDs too.
                 if let EventLine::State { mode: Mode::Hold | Mode::Alarm }
                 | EventLine::Alarm { .. }
@@ -197,9 +196,12 @@ impl Talk {
                 if let EventLine::State { mode: Mode::Work } = event {
                     self.hub.works(self.number);
                 }
-                self.hub.event(self.number, &line);
+                self.hub.news(self.number, news);
             }
-            Happening::Command(_) => {}
+            Happening::Status(..) | Happening::Settings(..) | Happening::Examples(_) => {
+                self.hub.news(self.number, news);
+            }
+            Happening::Started { .. } | Happening::Command(_) => {}
             Happening::Answer(line) => {
                 self.answer.truncate(LINES - 1);
                 self.answer.push(line);
@@ -209,9 +211,12 @@ impl Talk {
                 self.end(number, &Ok(lines));
             }
             Happening::Unanswered { number, why, .. } => self.end(number, &Err(why)),
-            Happening::Settings(_, shown) => self.hub.know(self.number, "settings", shown.into()),
-            Happening::Examples(lines) => self.hub.know(self.number, "examples", lines.into()),
         }
+    }
+
+    /// Tells the operator something about this machine.
+    fn tell(&self, what: &str) {
+        (self.tell)(&format!("{}: {what}.", self.name));
     }
 }
 

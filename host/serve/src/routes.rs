@@ -373,7 +373,7 @@ mod tests {
         let hub = Arc::new(Hub::new(1, 5000, Box::new(link::moment::Moment::now)));
         let mut page = pin!(heard(&hub).map(|message| message.text));
         for number in 0..1000 {
-            hub.event(0, &number.to_string());
+            hub.news(0, serde_json::json!({ "is": "event", "said": number }));
         }
         assert!(page.next().await.unwrap().contains("lost"));
         assert_eq!(page.next().await.as_deref(), Some(r#"{"is":"dropped"}"#));
@@ -381,7 +381,7 @@ mod tests {
         let mut page = pin!(heard(&hub).map(|message| message.text));
         assert!(page.next().await.unwrap().contains("lost"));
         assert_eq!(page.next().await.as_deref(), Some(r#"{"is":"beat"}"#));
-        hub.there(0, "0.2.0", &[], &[]);
+        hub.news(0, serde_json::json!({ "is": "there" }));
         assert!(page.next().await.unwrap().contains("there"));
     }
 }
