@@ -231,10 +231,7 @@ impl Line<'_> {
     /// If the text is none.
     pub fn value<T: FromStr>(&self, column: &str, right: &str) -> Result<T, FileError> {
         let text = self.text(column);
-        let point: Cow<str> = match self.table.separator {
-            b',' => text.into(),
-            _ => with_point(text),
-        };
+        let point = if self.table.separator == b',' { text.into() } else { with_point(text) };
         let whole =
             || point.split_once('.').filter(|(_, zeros)| zeros.bytes().all(|digit| digit == b'0'))?.0.parse().ok();
         point.parse().ok().or_else(whole).ok_or_else(|| {

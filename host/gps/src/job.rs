@@ -21,8 +21,8 @@ use crate::plane::Place;
 use crate::receiver::{Counts, Fix, Jump, Mark, Receiver};
 use crate::track::{Basis, Found, Missing, Track};
 use crate::wheel::{self, Ratio};
-use link::settings::Setting;
 use link::Class;
+use link::settings::Setting;
 use logbook::follower::{Followed, Follower};
 use logbook::log::{Entry, Kind};
 use std::ops::Range;
@@ -317,19 +317,13 @@ const LINE_STEP_M: f64 = 0.5;
 
 /// The lines along this distance, where positions are known.
 fn lines(distance_m: &Range<f64>, find: impl Fn(f64) -> Result<Found, Missing>) -> Vec<Vec<Place>> {
-    let mut lines: Vec<Vec<Place>> = vec![Vec::new()];
-    let steps = ((distance_m.end - distance_m.start) / LINE_STEP_M).ceil().max(1.0);
-    for step in 0..=steps as u64 {
-        let share = step as f64 / steps;
-        match (find(distance_m.start + share * (distance_m.end - distance_m.start)), lines.last_mut()) {
-            (Ok(found), Some(line)) => line.push(found.place),
-            (Err(_), Some(line)) if !line.is_empty() => lines.push(Vec::new()),
-            _ => {}
-        }
-    }
+    let length_m = distance_m.end - distance_m.start;
+    let steps = (length_m / LINE_STEP_M).ceil().max(1.0);
+    let distances_m = (0..=steps as u64).map(|step| distance_m.start + step as f64 / steps * length_m);
+    let places: Vec<Option<Place>> = distances_m.map(|at_m| find(at_m).ok().map(|found| found.place)).collect();
     // A single position is no line.
-    lines.retain(|line| line.len() > 1);
-    lines
+    let lines = places.split(Option::is_none).filter(|line| line.len() > 1);
+    lines.map(|line| line.iter().flatten().copied().collect()).collect()
 }
 
 /// The last offsets of beam and tool in a log.

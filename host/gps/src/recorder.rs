@@ -60,8 +60,7 @@ impl Recorder {
             Happening::Lost(_) => self.wheel_lost(),
             Happening::Status(status, _) => {
                 if !self.distance.take(status.position, self.tick_mm) {
-                    self.wheel_lost();
-                    self.distance.take(status.position, self.tick_mm);
+                    self.receiver.wheel_lost();
                 }
                 let rolled_m = self.distance.at(status.position, self.tick_mm).unwrap_or_default() / 1000.0;
                 self.receiver.rolled(time_ms as f64, rolled_m, f64::from(status.speed_mm_s));

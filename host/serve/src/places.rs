@@ -77,16 +77,14 @@ impl Table {
     fn enter(&mut self, new: Taken) {
         let others: Vec<&Taken> = self.0.iter().filter(|taken| taken.stage == new.stage).collect();
         if others.len() >= PLACES {
-            let count = |client: Client| {
-                others.iter().map(|taken| taken.client).chain([new.client]).filter(|&one| one == client).count()
-            };
-            let most = others.iter().map(|taken| count(taken.client)).max();
-            let mut those = others.iter().filter(|taken| Some(count(taken.client)) == most);
+            let clients = || others.iter().map(|taken| taken.client).chain([new.client]);
+            let count = |taken: &&&Taken| clients().filter(|&client| client == taken.client).count();
+            // Of clients with as many connections, the last one is found.
             let goes = match new.stage {
                 // A page that listens already stays with its machines.
-                Stage::Listening => those.next_back(),
+                Stage::Listening => others.iter().max_by_key(count),
                 // A connection that waits for its client soon becomes the oldest. One that was just answered is not.
-                Stage::Opening | Stage::Asking | Stage::Holding => those.next(),
+                Stage::Opening | Stage::Asking | Stage::Holding => others.iter().rev().max_by_key(count),
             };
             if let Some(lost) = goes.map(|taken| Arc::clone(&taken.lost)) {
                 self.leave(&lost);
