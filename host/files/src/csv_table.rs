@@ -208,16 +208,12 @@ fn opened(text: &str, before: u64, record: &StringRecord) -> Option<u64> {
 #[derive(Clone, Copy)]
 pub struct Line<'a> {
     table: &'a CsvTable,
-    number: u64,
+    /// Its number in the file, counted from 1.
+    pub number: u64,
     record: &'a StringRecord,
 }
 
 impl Line<'_> {
-    /// Its number in the file, counted from 1.
-    pub fn number(&self) -> u64 {
-        self.number
-    }
-
     /// The text in a column; empty if the table has no such column.
     pub fn text(&self, column: &str) -> &str {
         let place = self.table.header.iter().position(|name| name == column);

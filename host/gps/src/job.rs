@@ -232,7 +232,7 @@ impl Job {
         if let Some(last) = log.last() {
             job.end(&mut receiver, &mut reading, last, wanted);
         }
-        job.counts = receiver.counts();
+        job.counts = receiver.counts;
         job.midnight_ms = receiver.midnight_ms();
         job
     }
@@ -275,7 +275,7 @@ impl Job {
             event.found = track.find(event.distance_m, event.time_ms as f64, offset);
             if let (EventKind::Restart, Err(Missing::NoFixBehind)) = (event.kind, event.found) {
                 // The track ends at the last fix, a little before the machine's last position.
-                let last_m = track.stations().last().map_or(0.0, |station| station.distance_m);
+                let last_m = track.stations.last().map_or(0.0, |station| station.distance_m);
                 let error_m = event.distance_m - last_m;
                 let at_end = track.find(last_m, event.time_ms as f64, offset);
                 let beyond = |end: Found| Found { error_m: end.error_m + error_m, basis: Basis::Interpolated, ..end };
@@ -291,7 +291,7 @@ impl Job {
 
     /// Compares the wheel with the receiver. Returns where the wheel spun.
     fn compare(&mut self, track: &Track, wheel: &[Rolled]) -> Vec<Event> {
-        let stations = track.stations();
+        let stations = &track.stations;
         let spins = wheel::spins(stations);
         self.ratios.extend(wheel::ratios(stations, &spins));
         let event = |spin: &Range<usize>| {

@@ -94,7 +94,8 @@ struct Rolled {
 pub struct Receiver {
     /// The fix's standard deviation, if the user knows it.
     error_m: Option<f64>,
-    counts: Counts,
+    /// The counts so far.
+    pub counts: Counts,
     /// The fixes and marks since the caller took them last.
     pub heard: Heard,
     moment: Option<Moment>,
@@ -120,11 +121,6 @@ impl Receiver {
     /// metres. If it is `None`, the usual one of the reported quality is used.
     pub fn new(error_m: Option<f64>) -> Self {
         Self { error_m, ..Self::default() }
-    }
-
-    /// The counts so far.
-    pub fn counts(&self) -> Counts {
-        self.counts
     }
 
     /// The midnight from which the fixes' [`Fix::utc_ms`] counts, in milliseconds since the first of January 1970.
@@ -370,7 +366,7 @@ mod tests {
             let receiver = rolling(Place { latitude, longitude }, start_ms, 40, |_, lines| lines);
             let Heard { fixes, marks } = &receiver.heard;
             prop_assert_eq!(fixes.len(), 40);
-            prop_assert_eq!(receiver.counts(), Counts { fixes: 40, ..Counts::default() });
+            prop_assert_eq!(receiver.counts, Counts { fixes: 40, ..Counts::default() });
             prop_assert_eq!(marks, &[Mark::Found(Quality::Rtk)]);
             let midnight_ms = receiver.midnight_ms().expect("RMC has a date");
             for (second, pair) in fixes.windows(2).enumerate() {
@@ -397,7 +393,7 @@ mod tests {
             for fix in &receiver.heard.fixes {
                 prop_assert!(fix.place.distance_m(FIELD) < 1e-3);
             }
-            prop_assert!(receiver.counts().damaged <= 1);
+            prop_assert!(receiver.counts.damaged <= 1);
         }
     }
 
@@ -426,7 +422,7 @@ mod tests {
         };
         let receiver = rolling(FIELD, 0, 30, lost);
         assert_eq!(receiver.heard.marks, [Mark::Found(Quality::Rtk), Mark::Lost, Mark::Found(Quality::Rtk)]);
-        assert_eq!(receiver.counts(), Counts { fixes: 25, losses: 1, jumps: 0, damaged: 0 });
+        assert_eq!(receiver.counts, Counts { fixes: 25, losses: 1, jumps: 0, damaged: 0 });
     }
 
     #[test]
@@ -437,7 +433,7 @@ mod tests {
                 let place = plane.place(Metres { east: 0.5 * second as f64, north: 2.0 });
                 if off.contains(&second) { [gga(1000 * second, place), rmc(1000 * second, place)] } else { lines }
             });
-            assert_eq!(receiver.counts(), Counts { fixes: tracks.len() as u64, jumps, ..Counts::default() });
+            assert_eq!(receiver.counts, Counts { fixes: tracks.len() as u64, jumps, ..Counts::default() });
             let Heard { fixes, marks } = &receiver.heard;
             let jumped = |mark: &&Mark| matches!(mark, Mark::Jumped(jump) if jump.far_m >= 2.0);
             assert_eq!(marks.iter().filter(jumped).count() as u64, jumps);

@@ -126,7 +126,7 @@ impl Recorder {
 
     /// The counts so far.
     pub fn counts(&self) -> crate::receiver::Counts {
-        self.receiver.counts()
+        self.receiver.counts
     }
 
     fn marks(&mut self) -> impl Iterator<Item = (Kind, String)> + use<> {

@@ -116,7 +116,7 @@ pub(crate) struct Station {
 #[derive(Clone, Debug)]
 pub struct Track {
     plane: Plane,
-    stations: Vec<Station>,
+    pub(crate) stations: Vec<Station>,
     interval_ms: f64,
     longest_outage_m: f64,
 }
@@ -147,10 +147,6 @@ impl Track {
         intervals.sort_by(f64::total_cmp);
         let interval_ms = intervals.get(intervals.len() / 2).copied().unwrap_or(f64::INFINITY);
         Self { plane, stations, interval_ms, longest_outage_m }
-    }
-
-    pub(crate) fn stations(&self) -> &[Station] {
-        &self.stations
     }
 
     /// The position of an event with this offset from the antenna, at this distance of the wheel. It was recorded at
@@ -327,15 +323,8 @@ mod tests {
         let plane = Plane::around(FIELD);
         let fix = |(second, distance_m): (usize, f64)| {
             let (time_ms, utc_ms) = (1000.0 * second as f64, 1000 * second as i64);
-            let fix = Fix {
-                time_ms,
-                utc_ms,
-                place: plane.place(at(distance_m)),
-                quality: Quality::Rtk,
-                error_m: 0.015,
-                track: 0,
-            };
-            (distance_m, fix)
+            let place = plane.place(at(distance_m));
+            (distance_m, Fix { time_ms, utc_ms, place, quality: Quality::Rtk, error_m: 0.015, track: 0 })
         };
         distances_m.into_iter().enumerate().map(fix).collect()
     }
