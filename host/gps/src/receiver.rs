@@ -273,17 +273,14 @@ impl Receiver {
             wheel.rolled_m + wheel.speed_mm_s / 1000.0 * since_s
         });
         let here = Rolled { fix, rolled_m };
-        let Some(last) = self.last.filter(|_| wheel.is_some()) else {
-            self.jumped.clear();
-            return self.accept(here);
-        };
         // As the wheel rolls on, the machine could have reached the position of the jumped fixes. But these agree with
         // each other.
         let agrees = self.jumped.last().is_some_and(|jumped| Self::follows(jumped, &here));
-        if !agrees && Self::follows(&last, &here) {
+        let has_jumped = |last: &Rolled| wheel.is_some() && (agrees || !Self::follows(last, &here));
+        let Some(last) = self.last.filter(has_jumped) else {
             self.jumped.clear();
             return self.accept(here);
-        }
+        };
         self.counts.jumps += 1;
         let far_m = last.fix.place.distance_m(fix.place);
         let rolled_m = (rolled_m - last.rolled_m).abs();
