@@ -238,11 +238,10 @@ impl Job {
     }
 
     fn hear(&mut self, receiver: &mut Receiver, reading: &mut Reading, entry: &Entry) {
-        let heard = std::mem::take(&mut receiver.heard);
-        for fix in heard.fixes {
+        for fix in receiver.fixes.drain(..) {
             reading.fixes.push(Fix { time_ms: fix.time_ms - self.antenna.delay_ms, ..fix });
         }
-        for mark in heard.marks {
+        for mark in receiver.marks.drain(..) {
             if let Mark::Jumped(jump) = mark {
                 self.jumps.push((entry.number, jump));
             }

@@ -24,19 +24,15 @@ fn of_job(name: &str, job: &Job) -> Vec<Feature> {
         features.extend(of_stretch);
     }
     features.extend(job.jumps.iter().map(|&(line, jump)| {
-        let properties =
-            [("line", line.into()), ("record_s", rounded(jump.time_ms / 1000.0)), ("far_m", rounded(jump.far_m))];
+        let (record_s, far_m) = (rounded(jump.time_ms / 1000.0), rounded(jump.far_m));
+        let properties = vec![("line", line.into()), ("record_s", record_s), ("far_m", far_m)];
         feature("gps_jump", Some(Geometry::new_point(position(jump.place))), properties)
     }));
     features.iter_mut().for_each(|feature| feature.set_property("record", name));
     features
 }
 
-fn feature(
-    kind: &str,
-    geometry: Option<Geometry>,
-    properties: impl IntoIterator<Item = (&'static str, JsonValue)>,
-) -> Feature {
+fn feature(kind: &str, geometry: Option<Geometry>, properties: Vec<(&str, JsonValue)>) -> Feature {
     let properties = properties.into_iter().map(|(name, value)| (name.to_owned(), value));
     let mut feature = Feature { geometry, properties: Some(properties.collect()), ..Feature::default() };
     feature.set_property("kind", kind);
@@ -83,7 +79,7 @@ fn ground(ground: &Ground) -> Option<Feature> {
         1 => parts.pop().map(Geometry::new_line_string),
         _ => Some(Geometry::new_multi_line_string(parts)),
     };
-    let properties = [
+    let properties = vec![
         ("record_s", rounded(ground.time_ms.start as f64 / 1000.0)),
         ("distance_m", rounded(ground.distance_m.start)),
         ("length_m", rounded(length_m)),

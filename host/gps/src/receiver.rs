@@ -18,7 +18,7 @@
 mod delay;
 mod heard;
 
-pub use self::heard::{Counts, Fix, Heard, Jump, Mark};
+pub use self::heard::{Counts, Fix, Jump, Mark};
 
 use self::delay::{LONGEST_DELAY_MS, LeastAhead};
 use crate::plane::Place;
@@ -96,8 +96,11 @@ pub struct Receiver {
     error_m: Option<f64>,
     /// The counts so far.
     pub counts: Counts,
-    /// The fixes and marks since the caller took them last.
-    pub heard: Heard,
+    /// The complete fixes that the caller has not taken yet. Several come at once if earlier fixes had jumped and are
+    /// accepted after all.
+    pub fixes: Vec<Fix>,
+    /// The marks that the caller has not taken yet.
+    pub marks: Vec<Mark>,
     moment: Option<Moment>,
     /// Midnights since the first line.
     days: i64,
@@ -202,7 +205,7 @@ impl Receiver {
         if self.has_fix != Some(false) {
             self.has_fix = Some(false);
             self.counts.losses += 1;
-            self.heard.marks.push(Mark::Lost);
+            self.marks.push(Mark::Lost);
         }
     }
 
@@ -216,7 +219,7 @@ impl Receiver {
         }
         if self.has_fix != Some(true) {
             self.has_fix = Some(true);
-            self.heard.marks.push(Mark::Found(moment.quality.unwrap_or(Quality::Satellites)));
+            self.marks.push(Mark::Found(moment.quality.unwrap_or(Quality::Satellites)));
         }
         self.time(moment);
     }
@@ -242,7 +245,7 @@ impl Receiver {
         // A time that goes back is a step in any case.
         if first.utc_ms < self.timed_utc_ms || (has_stayed && is_whole) {
             self.least_ahead.forget();
-            self.heard.marks.push(Mark::Stepped(rise_s));
+            self.marks.push(Mark::Stepped(rise_s));
         }
         if has_stayed || self.least_ahead.ms().is_none() {
             self.release();
@@ -284,7 +287,7 @@ impl Receiver {
         self.counts.jumps += 1;
         let far_m = last.fix.place.distance_m(fix.place);
         let rolled_m = (rolled_m - last.rolled_m).abs();
-        self.heard.marks.push(Mark::Jumped(Jump { place: fix.place, time_ms: fix.time_ms, far_m, rolled_m }));
+        self.marks.push(Mark::Jumped(Jump { place: fix.place, time_ms: fix.time_ms, far_m, rolled_m }));
         if !agrees {
             self.jumped.clear();
         }
@@ -292,7 +295,7 @@ impl Receiver {
         let agree_ms = self.jumped.first().map_or(0.0, |first| fix.time_ms - first.fix.time_ms);
         if self.jumped.len() >= AGREEING && agree_ms >= AGREEING_MS {
             self.track += 1;
-            self.heard.marks.push(Mark::Stayed);
+            self.marks.push(Mark::Stayed);
             for mut jumped in std::mem::take(&mut self.jumped) {
                 jumped.fix.track = self.track;
                 self.accept(jumped);
@@ -309,7 +312,7 @@ impl Receiver {
 
     fn accept(&mut self, here: Rolled) {
         self.counts.fixes += 1;
-        self.heard.fixes.push(here.fix);
+        self.fixes.push(here.fix);
         self.last = Some(here);
     }
 }
@@ -361,7 +364,7 @@ mod tests {
             let longitude = [180.0 - off.abs(), -180.0 + off.abs(), off, 100.0][near];
             let start_ms = (DAY + 1) * DAY_MS + 1000 * start_s;
             let receiver = rolling(Place { latitude, longitude }, start_ms, 40, |_, lines| lines);
-            let Heard { fixes, marks } = &receiver.heard;
+            let Receiver { fixes, marks, .. } = &receiver;
             prop_assert_eq!(fixes.len(), 40);
             prop_assert_eq!(receiver.counts, Counts { fixes: 40, ..Counts::default() });
             prop_assert_eq!(marks, &[Mark::Found(Quality::Rtk)]);
@@ -387,7 +390,7 @@ mod tests {
             let is_known = |line: &str| stream.lines().any(|whole| whole == line) || Line::parse(line) == Line::Damaged;
             prop_assume!(cut.lines().all(is_known));
             cut.lines().enumerate().for_each(|(at, line)| receiver.take(500.0 * at as f64, line));
-            for fix in &receiver.heard.fixes {
+            for fix in &receiver.fixes {
                 prop_assert!(fix.place.distance_m(FIELD) < 1e-3);
             }
             prop_assert!(receiver.counts.damaged <= 1);
@@ -404,7 +407,7 @@ mod tests {
                 let due_ms = 1000.0 * pace * second as f64 + 70.0;
                 receiver.take(due_ms + late_ms[second as usize % late_ms.len()], &gga(1000 * second, FIELD));
             }
-            for fix in &receiver.heard.fixes {
+            for fix in &receiver.fixes {
                 let true_ms = pace * fix.utc_ms as f64 + 70.0;
                 assert!((fix.time_ms - true_ms).abs() <= within_ms, "{fix:?}");
             }
@@ -418,7 +421,7 @@ mod tests {
             if (10..15).contains(&second) { [none.clone(), none] } else { lines }
         };
         let receiver = rolling(FIELD, 0, 30, lost);
-        assert_eq!(receiver.heard.marks, [Mark::Found(Quality::Rtk), Mark::Lost, Mark::Found(Quality::Rtk)]);
+        assert_eq!(receiver.marks, [Mark::Found(Quality::Rtk), Mark::Lost, Mark::Found(Quality::Rtk)]);
         assert_eq!(receiver.counts, Counts { fixes: 25, losses: 1, jumps: 0, damaged: 0 });
     }
 
@@ -431,7 +434,7 @@ mod tests {
                 if off.contains(&second) { [gga(1000 * second, place), rmc(1000 * second, place)] } else { lines }
             });
             assert_eq!(receiver.counts, Counts { fixes: tracks.len() as u64, jumps, ..Counts::default() });
-            let Heard { fixes, marks } = &receiver.heard;
+            let Receiver { fixes, marks, .. } = &receiver;
             let jumped = |mark: &&Mark| matches!(mark, Mark::Jumped(jump) if jump.far_m >= 2.0);
             assert_eq!(marks.iter().filter(jumped).count() as u64, jumps);
             assert_eq!(marks.last() == Some(&Mark::Stayed), tracks.contains(&1));
@@ -443,7 +446,7 @@ mod tests {
     fn a_receiver_without_a_fix_from_the_beginning_is_marked_so() {
         let mut receiver = Receiver::new(None);
         (0..5).for_each(|second| receiver.take(1000.0 * f64::from(second), &framed("GPRMC,,V,,,,,,,,,,N")));
-        assert_eq!(receiver.heard.marks, [Mark::Lost]);
+        assert_eq!(receiver.marks, [Mark::Lost]);
         assert_eq!(receiver.midnight_ms(), None);
     }
 }

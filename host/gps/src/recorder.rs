@@ -129,9 +129,9 @@ impl Recorder {
         self.receiver.counts
     }
 
-    fn marks(&mut self) -> impl Iterator<Item = (Kind, String)> + use<> {
-        let heard = std::mem::take(&mut self.receiver.heard);
-        heard.marks.into_iter().map(|mark| (Kind::GpsMark, mark.to_string()))
+    fn marks(&mut self) -> impl Iterator<Item = (Kind, String)> {
+        self.receiver.fixes.clear();
+        self.receiver.marks.drain(..).map(|mark| (Kind::GpsMark, mark.to_string()))
     }
 }
 

@@ -126,24 +126,20 @@ impl Track {
     pub fn through(fixes: &[(f64, Fix)], longest_outage_m: f64) -> Self {
         let plane = Plane::around(fixes.first().map_or(Place::default(), |(_, fix)| fix.place));
         let mut stations: Vec<Station> = Vec::with_capacity(fixes.len());
-        let mut intervals = Vec::new();
         for &(distance_m, fix) in fixes {
             let at = plane.metres(fix.place);
-            let station = Station { fix, distance_m, at, fixes: 1.0, until_ms: fix.time_ms };
-            let Some(last) = stations.last_mut() else {
-                stations.push(station);
-                continue;
-            };
-            intervals.push(fix.time_ms - last.until_ms);
-            if last.fix.track == fix.track && (distance_m - last.distance_m).abs() < STANDING_M {
+            let stands =
+                |last: &&mut Station| last.fix.track == fix.track && (distance_m - last.distance_m).abs() < STANDING_M;
+            if let Some(last) = stations.last_mut().filter(stands) {
                 last.fixes += 1.0;
                 last.at += (at - last.at) / last.fixes;
                 last.fix.error_m = last.fix.error_m.max(fix.error_m);
                 last.until_ms = fix.time_ms;
             } else {
-                stations.push(station);
+                stations.push(Station { fix, distance_m, at, fixes: 1.0, until_ms: fix.time_ms });
             }
         }
+        let mut intervals: Vec<f64> = fixes.windows(2).map(|pair| pair[1].1.time_ms - pair[0].1.time_ms).collect();
         intervals.sort_by(f64::total_cmp);
         let interval_ms = intervals.get(intervals.len() / 2).copied().unwrap_or(f64::INFINITY);
         Self { plane, stations, interval_ms, longest_outage_m }

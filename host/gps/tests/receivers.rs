@@ -240,10 +240,9 @@ proptest! {
             }
         }
         receiver.end();
-        let gps::receiver::Heard { fixes, marks } = receiver.heard;
-        let steps = marks.iter().filter(|mark| matches!(mark, Mark::Stepped(_))).count();
-        prop_assert_eq!((fixes.len(), steps), (if is_lost { 52 } else { 60 }, 1));
-        for fix in fixes {
+        let steps = receiver.marks.iter().filter(|mark| matches!(mark, Mark::Stepped(_))).count();
+        prop_assert_eq!((receiver.fixes.len(), steps), (if is_lost { 52 } else { 60 }, 1));
+        for fix in receiver.fixes {
             let metres = plane.metres(fix.place).length();
             prop_assert!((fix.time_ms - 1000.0 * metres / (SPEED / 1000.0)).abs() < 100.0, "{:?}", fix);
         }

@@ -16,7 +16,7 @@ use super::door::Door;
 use super::hub::{Hub, Message};
 use super::machine::{Machine, Tell};
 use super::page::Page;
-use super::pairing::{Pairing, Try, hexadecimal};
+use super::pairing::{Pairing, Try};
 use super::places::{Client, Place, Stage};
 use super::random;
 use super::rules::{self, Forbidden, Reach};
@@ -194,7 +194,7 @@ async fn pair(
             };
             let paired = served.pairing.lock().pair(token);
             (served.tell)(&format!("{address} is paired now. Paired in all: {paired}."));
-            let cookie = format!("{COOKIE_NAME}={}; HttpOnly; SameSite=Strict; Path=/", hexadecimal(&token));
+            let cookie = format!("{COOKIE_NAME}={}; HttpOnly; SameSite=Strict; Path=/", hex::encode(token));
             (StatusCode::NO_CONTENT, [(SET_COOKIE, cookie)]).into_response()
         }
         Try::Wrong { left: 0 } => {
