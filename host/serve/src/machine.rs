@@ -293,11 +293,8 @@ mod tests {
         let (_, mut early) = hub.listen();
         assert_eq!(type_soon(&machine, "set k 5").await, ok());
         until(|| shows(&there(), "k=5 ")).await;
-        let told = std::iter::from_fn(|| early.try_recv().ok());
-        assert!(
-            told.into_iter()
-                .any(|message| message.text.contains(r#""is":"settings""#) && message.text.contains("k=5 "))
-        );
+        let mut told = std::iter::from_fn(|| early.try_recv().ok()).map(|message| message.text);
+        assert!(told.any(|text| text.contains(r#""is":"settings""#) && text.contains("k=5 ")));
         assert_eq!(type_soon(&machine, "events off").await, ok());
         until(|| board.typed() == ["events on", "set k 5", "events off", "events on"]).await;
     }
