@@ -23,9 +23,9 @@ const MOST_NESTED: usize = 40;
 /// If it cannot be read, is a folder, is too long, or is no UTF-8: with the line.
 pub fn text(path: &Path) -> Result<String, FileError> {
     let bytes = bytes(path)?;
-    let wrong = |problem: String| FileError::Line { path: path.into(), line: 0, problem };
     if bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]) {
-        return Err(wrong("saved as UTF-16: save it as UTF-8".to_owned()));
+        let problem = "saved as UTF-16: save it as UTF-8".to_owned();
+        return Err(FileError::Line { path: path.into(), line: 0, problem });
     }
     let text = String::from_utf8(bytes).map_err(|error| {
         let valid = String::from_utf8_lossy(&error.as_bytes()[..error.utf8_error().valid_up_to()]).into_owned();

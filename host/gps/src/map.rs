@@ -6,7 +6,7 @@
 
 use crate::job::{Did, Event, EventKind, Ground, Job};
 use crate::plane::Place;
-use chrono::DateTime;
+use chrono::{DateTime, SecondsFormat};
 use geojson::{Feature, FeatureCollection, Geometry, JsonValue, Position};
 
 /// The map of some jobs, each with its record's name.
@@ -41,9 +41,11 @@ fn feature(kind: &str, geometry: Option<Geometry>, properties: Vec<(&str, JsonVa
 
 fn event(job: &Job, event: &Event) -> Feature {
     let found = event.found.ok();
-    let time = found.zip(job.midnight_ms).and_then(|(found, midnight)| utc(midnight + found.utc_ms));
+    // In the form of ISO 8601 that QGIS accepts; null without a date, or for an invalid one.
+    let utc_ms = found.zip(job.midnight_ms).map(|(found, midnight)| midnight + found.utc_ms);
+    let time = utc_ms.and_then(DateTime::from_timestamp_millis);
     let mut properties = vec![
-        ("time", time.map_or(JsonValue::Null, JsonValue::from)),
+        ("time", time.map(|time| time.to_rfc3339_opts(SecondsFormat::Millis, true)).into()),
         ("record_s", rounded(event.time_ms as f64 / 1000.0)),
         ("distance_m", rounded(event.distance_m)),
         ("line", event.line.into()),
@@ -115,10 +117,4 @@ fn position(place: Place) -> Position {
 /// Seconds or metres with three decimals.
 fn rounded(value: f64) -> JsonValue {
     ((value * 1000.0).round() / 1000.0).into()
-}
-
-/// A time in the form of ISO 8601, which QGIS accepts. `None` for an invalid date.
-fn utc(time_ms: i64) -> Option<String> {
-    let time = DateTime::from_timestamp_millis(time_ms)?;
-    Some(time.to_rfc3339_opts(chrono::SecondsFormat::Millis, true))
 }

@@ -130,6 +130,7 @@ impl Summary {
         }
         summary.weeded_percent = (summary.worked_m > 0.0).then(|| 100.0 * summary.weeded_m / summary.worked_m);
         summary.area_ha = summary.worked_m * stand.row_spacing_mm / 1000.0 / 10_000.0;
+        let hours = |time_ms: u64| time_ms as f64 / 3_600_000.0;
         summary.work_h = hours(work_ms);
         summary.record_h = hours(record_ms);
         summary.count_spacings(&spacings_mm(job), stand);
@@ -149,10 +150,6 @@ impl Summary {
         self.spacing_mean_mm = (count > 0.0).then_some(mean);
         self.spacing_scatter_mm = (count > 1.0).then(|| (squares / (count - 1.0)).sqrt());
     }
-}
-
-fn hours(time_ms: u64) -> f64 {
-    time_ms as f64 / 3_600_000.0
 }
 
 /// The distances between neighbouring plants, in mm, if the machine was at work from one to the other.

@@ -156,8 +156,9 @@ impl Track {
         if from.fix.track != to.fix.track {
             return Err(Missing::Jumped);
         }
-        let basis = if self.follow(from, to) { Basis::Measured } else { Basis::Interpolated };
-        if basis == Basis::Interpolated && (to.distance_m - from.distance_m).abs() > self.longest_outage_m {
+        let is_outage = to.fix.time_ms - from.until_ms > INTERVALS * self.interval_ms;
+        let basis = if is_outage { Basis::Interpolated } else { Basis::Measured };
+        if is_outage && (to.distance_m - from.distance_m).abs() > self.longest_outage_m {
             return Err(Missing::OutageTooLong);
         }
         let share = (distance_m - from.distance_m) / (to.distance_m - from.distance_m);
@@ -196,11 +197,6 @@ impl Track {
         let farthest =
             self.stations[..before].iter().map(|station| station.distance_m).fold(f64::NEG_INFINITY, f64::max);
         Err(if distance_m > farthest && before > 0 { Missing::NoFixBehind } else { Missing::NoFixBefore })
-    }
-
-    /// Whether two fixes are successive, without an outage.
-    fn follow(&self, from: &Station, to: &Station) -> bool {
-        to.fix.time_ms - from.until_ms <= INTERVALS * self.interval_ms
     }
 
     /// The machine's heading between a fix and the next, as a metre forward, and its standard deviation in radians.

@@ -64,9 +64,9 @@ impl Reading {
         let next = self.wheel.partition_point(|rolled| rolled.time_ms < time_ms);
         let before = next.checked_sub(1).map(|place| self.wheel[place]);
         match (before, self.wheel.get(next)) {
-            (Some(from), Some(to)) if Self::is_gap(&from, to) => None,
             (Some(from), Some(to)) => {
-                Some(from.m + (to.m - from.m) * (time_ms - from.time_ms) / (to.time_ms - from.time_ms))
+                let share = (time_ms - from.time_ms) / (to.time_ms - from.time_ms);
+                (!Self::is_gap(&from, to)).then_some(from.m + (to.m - from.m) * share)
             }
             (None, Some(&at)) | (Some(at), None) => ((time_ms - at.time_ms).abs() <= STANDING_MS).then_some(at.m),
             (None, None) => None,
@@ -75,7 +75,11 @@ impl Reading {
 
     pub(super) fn status(&mut self, status: Status, at_m: f64, entry: &Entry) {
         self.wheel.push(Rolled { time_ms: entry.time_ms as f64, m: at_m, line: entry.number });
-        let did = did(&status);
+        let did = match (status.mode, status.tool_out) {
+            (Mode::Work, false) => Did::Weeded,
+            (Mode::Work, true) => Did::Spared,
+            (Mode::Hold | Mode::Alarm, _) => Did::Rolled,
+        };
         match self.ground.last_mut() {
             None => self.ground.push(Ground::begin(did, at_m, entry.time_ms)),
             Some(passed) => {
@@ -158,15 +162,6 @@ impl Reading {
         let Some(detection) = self.events.iter().rev().find(is_detection).cloned() else { return };
         let (line, time_ms, text) = (command.number, command.time_ms, command.text.clone());
         self.events.push(Event { kind: EventKind::Label(class), line, text, time_ms, ..detection });
-    }
-}
-
-/// The work of a machine with this status.
-fn did(status: &Status) -> Did {
-    match (status.mode, status.tool_out) {
-        (Mode::Work, false) => Did::Weeded,
-        (Mode::Work, true) => Did::Spared,
-        (Mode::Hold | Mode::Alarm, _) => Did::Rolled,
     }
 }
 
