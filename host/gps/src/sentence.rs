@@ -7,7 +7,6 @@
 //! A sentence is damaged if its checksum is missing or wrong. Its content is not used. Binary is not damage.
 
 use crate::plane::Place;
-use chrono::{Datelike, NaiveDate, NaiveTime};
 use strum::Display;
 
 /// Milliseconds in a day.
@@ -153,20 +152,26 @@ impl<'a> Fields<'a> {
     }
 }
 
+/// Two digits of a text that has no other characters.
+fn pair(text: &str, at: usize) -> Option<i64> {
+    text.get(at..at + 2).filter(|pair| pair.bytes().all(|byte| byte.is_ascii_digit()))?.parse().ok()
+}
+
 /// Milliseconds since midnight of `hhmmss`, with or without a fraction.
 fn time_of_day_ms(text: &str) -> Option<i64> {
     let (whole, fraction) = text.split_once('.').unwrap_or((text, ""));
-    let time = NaiveTime::parse_from_str(whole, "%H%M%S").ok()?;
+    let (hours, minutes, seconds) = (pair(whole, 0)?, pair(whole, 2)?, pair(whole, 4)?);
+    let is_one = whole.len() == 6 && hours < 24 && minutes < 60 && seconds <= 60 && is_digits(fraction);
     let milliseconds: i64 = format!("{fraction:0<3}").get(..3)?.parse().ok()?;
-    let time_ms = time.signed_duration_since(NaiveTime::MIN).num_milliseconds() + milliseconds;
-    (whole.len() == 6 && is_digits(whole) && is_digits(fraction)).then_some(time_ms % DAY_MS)
+    is_one.then_some(((hours * 60 + minutes) * 60 + seconds) * 1000 + milliseconds).map(|time_ms| time_ms % DAY_MS)
 }
 
 /// Days since 1970 of `ddmmyy`. `None` if it is no date, or if it is before 2020: a receiver does not know yet, or has
 /// counted its weeks wrong.
 fn day(text: &str) -> Option<i64> {
-    let date = NaiveDate::parse_from_str(text, "%d%m%y").ok()?;
-    (text.len() == 6 && is_digits(text) && date.year() >= 2020).then(|| i64::from(date.to_epoch_days()))
+    let (day, month, year) = (pair(text, 0)?, pair(text, 2)?, pair(text, 4)?);
+    let date = chrono::NaiveDate::from_ymd_opt(2000 + year as i32, month as u32, day as u32)?;
+    (text.len() == 6 && (20..80).contains(&year)).then(|| i64::from(date.to_epoch_days()))
 }
 
 /// Degrees of `dddmm.mmmm` and its hemisphere, and how many metres the last digit is.
