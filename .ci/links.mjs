@@ -5,11 +5,7 @@ import { existsSync, readdirSync, readFileSync, statSync } from "node:fs";
 import { dirname, join, relative, resolve } from "node:path";
 
 const folder = resolve(process.argv[2] ?? ".");
-const texts = new Map();
-const textOf = (path) => {
-    if (!texts.has(path)) texts.set(path, readFileSync(path, "utf8"));
-    return texts.get(path);
-};
+const textOf = (path) => readFileSync(path, "utf8");
 
 /** Text without the code in it, where brackets are no links. */
 const bare = (path) => {

@@ -3,8 +3,10 @@
 
 use crate::FileError;
 use std::fs::File;
-use std::io::{self, ErrorKind, Read};
+use std::io::{ErrorKind, Read};
 use std::path::Path;
+use toml_parser::Source;
+use toml_parser::lexer::TokenKind;
 
 /// The longest file that people write, in MiB. Most have some KiB.
 const WRITTEN_MIB: u64 = 16;
@@ -21,9 +23,9 @@ const MOST_NESTED: usize = 40;
 /// If it cannot be read, is a folder, is too long, or is no UTF-8: with the line.
 pub fn text(path: &Path) -> Result<String, FileError> {
     let bytes = bytes(path)?;
-    let wrong = |problem: String| FileError::Line { path: path.into(), line: 0, problem };
     if bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]) {
-        return Err(wrong("saved as UTF-16: save it as UTF-8".to_owned()));
+        let problem = "saved as UTF-16: save it as UTF-8".to_owned();
+        return Err(FileError::Line { path: path.into(), line: 0, problem });
     }
     let text = String::from_utf8(bytes).map_err(|error| {
         let valid = String::from_utf8_lossy(&error.as_bytes()[..error.utf8_error().valid_up_to()]).into_owned();
@@ -52,11 +54,7 @@ fn up_to(path: &Path, most_mib: u64) -> Result<Vec<u8>, FileError> {
     let unread = |source| FileError::unread(path, source);
     let file = File::open(path).map_err(unread)?;
     if file.metadata().is_ok_and(|there| there.is_dir()) {
-        return Err(FileError::unusable(
-            path,
-            "is a folder, and a file is needed",
-            io::Error::from(ErrorKind::IsADirectory),
-        ));
+        return Err(FileError::unusable(path, "is a folder, and a file is needed", ErrorKind::IsADirectory.into()));
     }
     let mut bytes = Vec::new();
     file.take((most_mib << 20) + 1).read_to_end(&mut bytes).map_err(unread)?;
@@ -73,46 +71,19 @@ fn up_to(path: &Path, most_mib: u64) -> Result<Vec<u8>, FileError> {
 /// Names the line in which it is too deep.
 pub fn check_nesting(path: &Path, text: &str) -> Result<(), FileError> {
     let (mut depth, mut dots) = (0_usize, 0_usize);
-    let mut letters = text.char_indices().peekable();
-    while let Some((byte, letter)) = letters.next() {
-        match letter {
-            '#' => while letters.next_if(|(_, other)| *other != '\n').is_some() {},
-            '"' | '\'' => {
-                let quotes = text[byte..].chars().take_while(|other| *other == letter).count();
-                // Two are an empty text; three begin one of several lines.
-                let (ending, skipped) = if quotes >= 3 { (3, 3) } else { (1, 1) };
-                let mut rest = byte + skipped;
-                let end = letter.to_string().repeat(ending);
-                loop {
-                    let Some(at) = text[rest..].find(|other: char| {
-                        other == letter || other == '\\' && letter == '"' || other == '\n' && ending == 1
-                    }) else {
-                        rest = text.len();
-                        break;
-                    };
-                    rest += at;
-                    if text[rest..].starts_with('\\') {
-                        rest += 1 + text[rest + 1..].chars().next().map_or(0, char::len_utf8);
-                    } else if text[rest..].starts_with('\n') {
-                        break;
-                    } else if text[rest..].starts_with(&end) {
-                        rest += ending;
-                        break;
-                    } else {
-                        rest += 1;
-                    }
-                }
-                while letters.next_if(|(other, _)| *other < rest).is_some() {}
+    for token in Source::new(text).lex() {
+        match token.kind() {
+            TokenKind::LeftSquareBracket | TokenKind::LeftCurlyBracket => (depth, dots) = (depth + 1, 0),
+            TokenKind::RightSquareBracket | TokenKind::RightCurlyBracket => {
+                (depth, dots) = (depth.saturating_sub(1), 0)
             }
-            '[' | '{' => (depth, dots) = (depth + 1, 0),
-            ']' | '}' => (depth, dots) = (depth.saturating_sub(1), 0),
-            '=' | ',' | '\n' => dots = 0,
-            '.' => dots += 1,
+            TokenKind::Equals | TokenKind::Comma | TokenKind::Newline => dots = 0,
+            TokenKind::Dot => dots += 1,
             _ => {}
         }
         if depth + dots > MOST_NESTED {
             let problem = format!("more than {MOST_NESTED} tables or lists lie within each other");
-            return Err(FileError::at_byte(path, text, byte, problem));
+            return Err(FileError::at_byte(path, text, token.span().start(), problem));
         }
     }
     Ok(())

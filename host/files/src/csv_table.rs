@@ -20,13 +20,6 @@ pub struct CsvTable {
     lines: Vec<(u64, StringRecord)>,
 }
 
-/// Whether a line may end before the last column.
-#[derive(Clone, Copy, PartialEq)]
-enum ShortLines {
-    Refused,
-    Filled,
-}
-
 /// What may separate the cells of a line, the usual one first.
 const SEPARATORS: [u8; 3] = *b",;\t";
 
@@ -44,7 +37,7 @@ impl CsvTable {
     /// # Errors
     /// As [`read`](Self::read), but a short line is none.
     pub fn read_with_gaps(path: &Path, columns: &[&str]) -> Result<Self, FileError> {
-        Self::parse_lines(path, bounded_file::bytes(path)?, columns, ShortLines::Filled)
+        Self::parse_lines(path, bounded_file::bytes(path)?, columns, true)
     }
 
     /// Parses a file's text. The table must have these columns and at least one line below its header.
@@ -54,10 +47,11 @@ impl CsvTable {
     /// # Errors
     /// Names the file, the line and what would be right.
     pub fn parse(path: &Path, text: Vec<u8>, columns: &[&str]) -> Result<Self, FileError> {
-        Self::parse_lines(path, text, columns, ShortLines::Refused)
+        Self::parse_lines(path, text, columns, false)
     }
 
-    fn parse_lines(path: &Path, text: Vec<u8>, columns: &[&str], short: ShortLines) -> Result<Self, FileError> {
+    /// As [`parse`](Self::parse). A line may end before the last column if `may_be_short`.
+    fn parse_lines(path: &Path, text: Vec<u8>, columns: &[&str], may_be_short: bool) -> Result<Self, FileError> {
         let at = |line: u64, problem: String| FileError::Line { path: path.into(), line, problem };
         let text = decoded(text).map_err(|(line, problem)| at(line, problem))?;
         let text = text.trim_end();
@@ -95,7 +89,7 @@ impl CsvTable {
             };
             let (found, right) = (record.len(), header.len());
             let has_more = record.iter().skip(right).any(|cell| !cell.is_empty());
-            if has_more || (found < right && short == ShortLines::Refused) {
+            if has_more || (found < right && !may_be_short) {
                 let hint = if has_more && separator == b',' {
                     "; numbers with decimal commas need semicolons or tabs between the fields, or a point"
                 } else {
@@ -214,16 +208,12 @@ fn opened(text: &str, before: u64, record: &StringRecord) -> Option<u64> {
 #[derive(Clone, Copy)]
 pub struct Line<'a> {
     table: &'a CsvTable,
-    number: u64,
+    /// Its number in the file, counted from 1.
+    pub number: u64,
     record: &'a StringRecord,
 }
 
 impl Line<'_> {
-    /// Its number in the file, counted from 1.
-    pub fn number(&self) -> u64 {
-        self.number
-    }
-
     /// The text in a column; empty if the table has no such column.
     pub fn text(&self, column: &str) -> &str {
         let place = self.table.header.iter().position(|name| name == column);
@@ -237,10 +227,7 @@ impl Line<'_> {
     /// If the text is none.
     pub fn value<T: FromStr>(&self, column: &str, right: &str) -> Result<T, FileError> {
         let text = self.text(column);
-        let point: Cow<str> = match self.table.separator {
-            b',' => text.into(),
-            _ => with_point(text),
-        };
+        let point = if self.table.separator == b',' { text.into() } else { with_point(text) };
         let whole =
             || point.split_once('.').filter(|(_, zeros)| zeros.bytes().all(|digit| digit == b'0'))?.0.parse().ok();
         point.parse().ok().or_else(whole).ok_or_else(|| {
@@ -371,44 +358,38 @@ mod tests {
     /// A table as a spreadsheet may save it: the habits are bits of `habits`.
     fn saved(habits: u32) -> Vec<u8> {
         let has = |habit: u32| habits & (1 << habit) != 0;
-        let separator = if has(0) {
-            ';'
-        } else if has(1) {
-            '\t'
-        } else {
-            ','
-        };
-        let point = if separator == ',' { '.' } else { ',' };
-        let join = |cells: &[&str]| cells.join(&separator.to_string());
+        let separator = [",", ";", "\t", ";"][habits as usize & 3];
+        let point = if separator == "," { "." } else { "," };
         let width = if has(2) { 6 } else { 3 };
+        let blank = separator.repeat(width - 1);
         // Excel looks at the first 16 rows, and pads no further than these need.
-        let pad = |number: usize, line: String| {
+        let row = |number: usize, cells: &[&str]| {
             let padded = if has(3) && number > 16 { 3 } else { width };
-            line + &separator.to_string().repeat(padded - 3)
+            cells.join(separator) + &separator.repeat(padded - 3)
         };
         let mut lines = Vec::new();
         if has(4) {
-            let mark = if separator == ',' { String::new() } else { separator.to_string().repeat(2) };
-            lines.push(format!("sep={separator}{mark}"));
+            lines.push(format!("sep={separator}{}", separator.repeat(if separator == "," { 0 } else { 2 })));
         }
         if has(5) {
-            lines.push(format!("\"# counted \"\"here\"\"{separator} and there\"{}", separator.to_string().repeat(2)));
+            lines.push(format!("\"# counted \"\"here\"\"{separator} and there\"{}", separator.repeat(2)));
         }
         if has(6) {
-            lines.push(separator.to_string().repeat(width - 1));
+            lines.push(blank.clone());
         }
-        lines.push(pad(0, join(&["place_mm", "width_mm", "kind"])));
+        lines.push(row(0, &["place_mm", "width_mm", "kind"]));
         for number in 1..=20 {
-            let (whole, decimal) =
-                (if has(7) { format!("{number}{point}0") } else { number.to_string() }, format!("{number}{point}25"));
-            let quoted = |cell: &str| if has(8) { format!("\"{cell}\"") } else { cell.to_owned() };
-            lines.push(pad(number, join(&[&quoted(&whole), &quoted(&decimal), "plant"])));
+            let decimals = if has(7) { format!("{point}0") } else { String::new() };
+            let quote = if has(8) { "\"" } else { "" };
+            let (whole, decimal) = (format!("{number}{decimals}"), format!("{number}{point}25"));
+            let [whole, decimal] = [whole, decimal].map(|cell| format!("{quote}{cell}{quote}"));
+            lines.push(row(number, &[&whole, &decimal, "plant"]));
             if has(9) && number % 7 == 0 {
-                lines.push(separator.to_string().repeat(width - 1));
+                lines.push(blank.clone());
             }
         }
         if has(6) {
-            lines.extend(vec![separator.to_string().repeat(width - 1); 3]);
+            lines.extend(vec![blank; 3]);
         }
         let text = lines.join(if has(10) { "\r\n" } else { "\n" });
         let mark = if has(11) { "\u{feff}" } else { "" };

@@ -18,14 +18,15 @@ mod reading;
 use self::reading::{Reading, Rolled};
 use crate::antenna::Antenna;
 use crate::plane::Place;
-use crate::receiver::{Counts, Fix, Heard, Jump, Mark, Receiver};
-use crate::track::{Basis, Found, Missing, Offset, Track};
+use crate::receiver::{Counts, Fix, Jump, Mark, Receiver};
+use crate::track::{Basis, Found, Missing, Track};
 use crate::wheel::{self, Ratio};
+use link::Class;
 use link::settings::Setting;
-use link::{Class, Mode};
 use logbook::follower::{Followed, Follower};
 use logbook::log::{Entry, Kind};
 use std::ops::Range;
+use strum::IntoStaticStr;
 
 /// The parameters of reading a log.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,7 +44,8 @@ impl Default for Wanted {
 }
 
 /// The kinds of event.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
 pub enum EventKind {
     /// A detection that the beam has seen.
     Detection {
@@ -77,15 +79,9 @@ impl EventKind {
             Self::Detection { class: Class::Plant, .. } => "plant",
             Self::Detection { class: Class::Weed, .. } => "weed",
             Self::Detection { class: Class::Unknown, .. } => "unknown",
-            Self::Guarded => "guarded",
             Self::Label(Class::Plant) => "label_plant",
             Self::Label(_) => "label_weed",
-            Self::SwingOut => "swing_out",
-            Self::SwingIn => "swing_in",
-            Self::Alarm => "alarm",
-            Self::Restart => "restart",
-            Self::WheelSpun => "wheel_spun",
-            Self::WheelGap => "wheel_gap",
+            other => other.into(),
         }
     }
 }
@@ -181,49 +177,26 @@ pub struct Job {
     pub spun_m: f64,
 }
 
-/// A restart at work that is not certain yet.
-#[derive(Default)]
-struct Restart {
-    /// Index of its stretch and its event.
-    at: Option<(usize, usize)>,
-    /// Whether the link is there again.
-    is_connected: bool,
-    cause: Option<String>,
-}
-
 impl Job {
     /// Reads a record.
     pub fn read(log: &[Entry], wanted: &Wanted) -> Self {
         let antenna = wanted.antenna.or_else(|| antenna_of(log)).unwrap_or_default();
         let mut job = Self { antenna, ..Self::default() };
         let mut receiver = Receiver::new(antenna.error_m());
-        let mut follower = Follower::default();
-        let mut reading = Reading::default();
-        let mut restart = Restart::default();
-        let mut last_ms = 0;
-        for entry in log {
+        let (mut follower, mut reading) = (Follower::default(), Reading::default());
+        for (at, entry) in log.iter().enumerate() {
             let tick_mm = follower.tick_mm();
             let followed = follower.take(entry);
-            let is_cut = match &followed {
-                Followed::Linked => true,
-                Followed::Status(_, goes_on) => !goes_on,
-                _ => false,
-            };
+            let is_cut = matches!(followed, Followed::Linked | Followed::Status(_, false));
             // An earlier time: the log was closed, and opened again.
-            if is_cut || entry.time_ms < last_ms {
-                let was_at_work = reading.last_status.as_ref().is_some_and(|status| status.mode == Mode::Work);
-                if matches!(followed, Followed::Linked) && was_at_work {
-                    reading.restart(entry);
-                    restart =
-                        Restart { at: Some((job.stretches.len(), reading.events.len() - 1)), ..Restart::default() };
+            if is_cut || reading.time_ms.as_ref().is_some_and(|range| entry.time_ms < range.end) {
+                if matches!(followed, Followed::Linked) {
+                    reading.restart(entry, &log[at..]);
                 }
                 job.end(&mut receiver, &mut reading, entry, wanted);
             }
-            last_ms = entry.time_ms;
-            restart.is_connected |= entry.kind == Kind::Connected;
             match followed {
                 Followed::Status(status, _) => {
-                    job.judge(&mut restart, status.mode != Mode::Work);
                     if let Some(mm) = follower.mm(status.position) {
                         let m = mm / 1000.0;
                         receiver.rolled(entry.time_ms as f64, m, f64::from(status.speed_mm_s));
@@ -236,17 +209,14 @@ impl Job {
                 _ => {}
             }
             match entry.kind {
-                Kind::Gps | Kind::GpsDamaged => {
-                    let heard = receiver.take(entry.time_ms as f64, &entry.text);
-                    job.heard(heard, &mut reading, entry);
-                }
+                Kind::Gps | Kind::GpsDamaged => receiver.take(entry.time_ms as f64, &entry.text),
                 Kind::GpsLost => {
                     job.unplugged += 1;
-                    job.heard(receiver.silent(), &mut reading, entry);
+                    receiver.silent();
                 }
-                _ if restart.at.is_some() => restart.cause = cause(&entry.text).or(restart.cause),
                 _ => {}
             }
+            job.hear(&mut receiver, &mut reading, entry);
             if follower.tick_mm() != tick_mm && !reading.wheel.is_empty() {
                 // The machine's position stays.
                 let last_status = reading.last_status.take();
@@ -262,45 +232,27 @@ impl Job {
         if let Some(last) = log.last() {
             job.end(&mut receiver, &mut reading, last, wanted);
         }
-        let is_certain = restart.is_connected;
-        job.judge(&mut restart, is_certain);
-        job.counts = receiver.counts();
+        job.counts = receiver.counts;
         job.midnight_ms = receiver.midnight_ms();
         job
     }
 
-    /// Ends a stretch.
-    fn end(&mut self, receiver: &mut Receiver, reading: &mut Reading, entry: &Entry, wanted: &Wanted) {
-        self.heard(receiver.end(), reading, entry);
-        receiver.wheel_lost();
-        self.close(reading, wanted);
-    }
-
-    /// Keeps the mark of a restart, or removes it: the machine has worked on without its link.
-    fn judge(&mut self, restart: &mut Restart, is_one: bool) {
-        let Restart { at: Some((stretch, event)), cause, .. } = std::mem::take(restart) else { return };
-        let Some(stretch) = self.stretches.get_mut(stretch) else { return };
-        if is_one {
-            let cause = cause.map_or(String::new(), |cause| format!(" ({cause})"));
-            stretch.events[event].text = format!("restarted{cause} while at work: not weeded from here");
-        } else {
-            stretch.events.remove(event);
-        }
-    }
-
-    fn heard(&mut self, heard: Heard, reading: &mut Reading, entry: &Entry) {
-        for fix in heard.fixes {
+    fn hear(&mut self, receiver: &mut Receiver, reading: &mut Reading, entry: &Entry) {
+        for fix in receiver.fixes.drain(..) {
             reading.fixes.push(Fix { time_ms: fix.time_ms - self.antenna.delay_ms, ..fix });
         }
-        for mark in heard.marks {
+        for mark in receiver.marks.drain(..) {
             if let Mark::Jumped(jump) = mark {
                 self.jumps.push((entry.number, jump));
             }
         }
     }
 
-    /// Gives the events of a stretch their positions, and begins another one.
-    fn close(&mut self, reading: &mut Reading, wanted: &Wanted) {
+    /// Ends a stretch: gives its events their positions, and begins another one.
+    fn end(&mut self, receiver: &mut Receiver, reading: &mut Reading, entry: &Entry, wanted: &Wanted) {
+        receiver.end();
+        self.hear(receiver, reading, entry);
+        receiver.wheel_lost();
         let read = std::mem::take(reading);
         if read.wheel.is_empty() {
             return;
@@ -310,12 +262,7 @@ impl Job {
         // When a shorter delay is found, a later fix may get an earlier time.
         fixes.sort_by(|(_, one), (_, other)| one.time_ms.total_cmp(&other.time_ms));
         let track = Track::through(&fixes, wanted.longest_outage_m);
-        let find = |distance_m: f64, recorded_ms: u64, offset: Offset| match &track {
-            Some(track) => track.find(distance_m, recorded_ms as f64, offset),
-            None => Err(Missing::NoFixBefore),
-        };
-        let marks =
-            read.gaps().chain(track.iter().flat_map(|track| self.compare(track, &read.wheel))).collect::<Vec<_>>();
+        let marks: Vec<Event> = read.gaps().chain(self.compare(&track, &read.wheel)).collect();
         let (beam, tool) = (self.antenna.beam(), self.antenna.tool(read.beam_to_tool_mm));
         let (mut events, mut ground) = (read.events, read.ground);
         events.extend(marks);
@@ -324,35 +271,36 @@ impl Job {
                 EventKind::Detection { .. } | EventKind::Guarded | EventKind::Label(_) => beam,
                 _ => tool,
             };
-            event.found = find(event.distance_m, event.time_ms, offset);
-            if let (EventKind::Restart, Err(Missing::NoFixBehind), Some(track)) = (event.kind, event.found, &track) {
+            event.found = track.find(event.distance_m, event.time_ms as f64, offset);
+            if let (EventKind::Restart, Err(Missing::NoFixBehind)) = (event.kind, event.found) {
                 // The track ends at the last fix, a little before the machine's last position.
-                let last_m = track.stations().last().map_or(0.0, |station| station.distance_m);
-                let on_m = event.distance_m - last_m;
-                let at_end = find(last_m, event.time_ms, offset);
-                event.found =
-                    at_end.map(|found| Found { error_m: found.error_m + on_m, basis: Basis::Interpolated, ..found });
+                let last_m = track.stations.last().map_or(0.0, |station| station.distance_m);
+                let error_m = event.distance_m - last_m;
+                let at_end = track.find(last_m, event.time_ms as f64, offset);
+                let beyond = |end: Found| Found { error_m: end.error_m + error_m, basis: Basis::Interpolated, ..end };
+                event.found = at_end.map(beyond);
             }
         }
         for ground in ground.iter_mut().filter(|ground| ground.did != Did::Rolled) {
-            let until_ms = ground.time_ms.end;
-            ground.lines = lines(&ground.distance_m, |distance_m| find(distance_m, until_ms, tool));
+            let until_ms = ground.time_ms.end as f64;
+            ground.lines = lines(&ground.distance_m, |distance_m| track.find(distance_m, until_ms, tool));
         }
         self.stretches.push(Stretch { events, ground, time_ms: read.time_ms.unwrap_or_default() });
     }
 
     /// Compares the wheel with the receiver. Returns where the wheel spun.
     fn compare(&mut self, track: &Track, wheel: &[Rolled]) -> Vec<Event> {
-        let stations = track.stations();
+        let stations = &track.stations;
         let spins = wheel::spins(stations);
         self.ratios.extend(wheel::ratios(stations, &spins));
         let event = |spin: &Range<usize>| {
             let (from, to) = (&stations[spin.start], &stations[spin.end]);
             let rolled_m = (to.distance_m - from.distance_m).abs();
             self.spun_m += rolled_m;
-            let at = wheel.partition_point(|rolled| rolled.time_ms < to.time_ms).min(wheel.len() - 1);
+            let at = wheel.partition_point(|rolled| rolled.time_ms < to.fix.time_ms).min(wheel.len() - 1);
             let text = format!("the wheel rolled {rolled_m:.1} m on the spot");
-            Event::mark(EventKind::WheelSpun, text, wheel[at].line, to.time_ms, from.distance_m.midpoint(to.distance_m))
+            let at_m = from.distance_m.midpoint(to.distance_m);
+            Event::mark(EventKind::WheelSpun, text, wheel[at].line, to.fix.time_ms, at_m)
         };
         spins.iter().map(event).collect()
     }
@@ -368,26 +316,13 @@ const LINE_STEP_M: f64 = 0.5;
 
 /// The lines along this distance, where positions are known.
 fn lines(distance_m: &Range<f64>, find: impl Fn(f64) -> Result<Found, Missing>) -> Vec<Vec<Place>> {
-    let mut lines: Vec<Vec<Place>> = vec![Vec::new()];
-    let steps = ((distance_m.end - distance_m.start) / LINE_STEP_M).ceil().max(1.0);
-    for step in 0..=steps as u64 {
-        let share = step as f64 / steps;
-        match (find(distance_m.start + share * (distance_m.end - distance_m.start)), lines.last_mut()) {
-            (Ok(found), Some(line)) => line.push(found.place),
-            (Err(_), Some(line)) if !line.is_empty() => lines.push(Vec::new()),
-            _ => {}
-        }
-    }
+    let length_m = distance_m.end - distance_m.start;
+    let steps = (length_m / LINE_STEP_M).ceil().max(1.0);
+    let distances_m = (0..=steps as u64).map(|step| distance_m.start + step as f64 / steps * length_m);
+    let places: Vec<Option<Place>> = distances_m.map(|at_m| find(at_m).ok().map(|found| found.place)).collect();
     // A single position is no line.
-    lines.retain(|line| line.len() > 1);
-    lines
-}
-
-/// The reset's cause in a line, such as the greeting.
-fn cause(line: &str) -> Option<String> {
-    let (_, rest) = line.split_once("reset by ")?;
-    let word: String = rest.chars().take_while(|letter| letter.is_alphanumeric() || *letter == '_').collect();
-    (!word.is_empty()).then_some(word)
+    let lines = places.split(Option::is_none).filter(|line| line.len() > 1);
+    lines.map(|line| line.iter().flatten().copied().collect()).collect()
 }
 
 /// The last offsets of beam and tool in a log.

@@ -6,11 +6,8 @@
 
 use crate::job::{Did, Event, EventKind, Ground, Job};
 use crate::plane::Place;
-use chrono::DateTime;
-use geojson::{Feature, FeatureCollection, Geometry, JsonObject, JsonValue, Position};
-
-/// Decimal places of a degree: the ninth is 0.1 mm.
-const DEGREE_DIGITS: i32 = 9;
+use chrono::{DateTime, SecondsFormat};
+use geojson::{Feature, FeatureCollection, Geometry, JsonValue, Position};
 
 /// The map of some jobs, each with its record's name.
 pub fn features(jobs: &[(&str, &Job)]) -> FeatureCollection {
@@ -20,61 +17,54 @@ pub fn features(jobs: &[(&str, &Job)]) -> FeatureCollection {
 
 fn of_job(name: &str, job: &Job) -> Vec<Feature> {
     let mut features = Vec::new();
-    for (number, stretch) in job.stretches.iter().enumerate() {
-        let mut add = |mut feature: Feature| {
-            feature.set_property("record", name);
-            feature.set_property("stretch", number + 1);
-            features.push(feature);
-        };
-        stretch.ground.iter().filter_map(ground).for_each(&mut add);
-        stretch.events.iter().map(|it| event(job, it)).for_each(&mut add);
+    for (number, stretch) in (1..).zip(&job.stretches) {
+        let ground = stretch.ground.iter().filter_map(ground);
+        let mut of_stretch: Vec<Feature> = ground.chain(stretch.events.iter().map(|it| event(job, it))).collect();
+        of_stretch.iter_mut().for_each(|feature| feature.set_property("stretch", number));
+        features.extend(of_stretch);
     }
-    for (line, jump) in &job.jumps {
-        let mut feature = feature("gps_jump", Some(Geometry::new_point(position(jump.place))));
-        feature.set_property("record", name);
-        feature.set_property("line", *line);
-        feature.set_property("record_s", rounded(jump.time_ms / 1000.0, 3));
-        feature.set_property("far_m", rounded(jump.far_m, 3));
-        features.push(feature);
-    }
+    features.extend(job.jumps.iter().map(|&(line, jump)| {
+        let (record_s, far_m) = (rounded(jump.time_ms / 1000.0), rounded(jump.far_m));
+        let properties = vec![("line", line.into()), ("record_s", record_s), ("far_m", far_m)];
+        feature("gps_jump", Some(Geometry::new_point(position(jump.place))), properties)
+    }));
+    features.iter_mut().for_each(|feature| feature.set_property("record", name));
     features
 }
 
-fn feature(kind: &str, geometry: Option<Geometry>) -> Feature {
-    let mut feature = Feature { geometry, properties: Some(JsonObject::new()), ..Feature::default() };
+fn feature(kind: &str, geometry: Option<Geometry>, properties: Vec<(&str, JsonValue)>) -> Feature {
+    let properties = properties.into_iter().map(|(name, value)| (name.to_owned(), value));
+    let mut feature = Feature { geometry, properties: Some(properties.collect()), ..Feature::default() };
     feature.set_property("kind", kind);
     feature
 }
 
 fn event(job: &Job, event: &Event) -> Feature {
-    let geometry = event.found.ok().map(|found| Geometry::new_point(position(found.place)));
-    let mut feature = feature(event.kind.name(), geometry);
     let found = event.found.ok();
-    let time = found.zip(job.midnight_ms).and_then(|(found, midnight)| utc(midnight + found.utc_ms));
-    feature.set_property("time", time.map_or(JsonValue::Null, JsonValue::from));
-    feature.set_property("record_s", rounded(event.time_ms as f64 / 1000.0, 3));
-    feature.set_property("distance_m", rounded(event.distance_m, 3));
-    feature.set_property("line", event.line);
-    match event.found {
-        Ok(found) => {
-            feature.set_property("place", <&str>::from(found.basis));
-            feature.set_property("error_m", rounded(found.error_m, 3));
-        }
-        Err(missing) => {
-            feature.set_property("place", "none");
-            feature.set_property("why", missing.to_string());
-        }
-    }
-    if let EventKind::Detection { votes, .. } = event.kind {
-        feature.set_property("votes", votes);
-    }
+    // In the form of ISO 8601 that QGIS accepts; null without a date, or for an invalid one.
+    let utc_ms = found.zip(job.midnight_ms).map(|(found, midnight)| midnight + found.utc_ms);
+    let time = utc_ms.and_then(DateTime::from_timestamp_millis);
+    let mut properties = vec![
+        ("time", time.map(|time| time.to_rfc3339_opts(SecondsFormat::Millis, true)).into()),
+        ("record_s", rounded(event.time_ms as f64 / 1000.0)),
+        ("distance_m", rounded(event.distance_m)),
+        ("line", event.line.into()),
+    ];
+    properties.extend(match event.found {
+        Ok(found) => [("place", <&str>::from(found.basis).into()), ("error_m", rounded(found.error_m))],
+        Err(missing) => [("place", "none".into()), ("why", missing.to_string().into())],
+    });
     if event.width_mm > 0.0 {
-        feature.set_property("width_mm", event.width_mm.round());
+        properties.push(("width_mm", event.width_mm.round().into()));
     }
-    if matches!(event.kind, EventKind::Alarm | EventKind::Restart | EventKind::WheelSpun | EventKind::WheelGap) {
-        feature.set_property("said", event.text.as_str());
+    match event.kind {
+        EventKind::Detection { votes, .. } => properties.push(("votes", votes.into())),
+        EventKind::Alarm | EventKind::Restart | EventKind::WheelSpun | EventKind::WheelGap => {
+            properties.push(("said", event.text.as_str().into()));
+        }
+        EventKind::Guarded | EventKind::Label(_) | EventKind::SwingOut | EventKind::SwingIn => {}
     }
-    feature
+    feature(event.kind.name(), found.map(|found| Geometry::new_point(position(found.place))), properties)
 }
 
 /// A line for ground over which the machine was at work.
@@ -85,17 +75,18 @@ fn ground(ground: &Ground) -> Option<Feature> {
         Did::Rolled => return None,
     };
     let length_m = ground.distance_m.end - ground.distance_m.start;
-    let parts: Vec<Vec<Position>> = ground.lines.iter().flat_map(|line| cut(line)).collect();
+    let mut parts: Vec<Vec<Position>> = ground.lines.iter().flat_map(|line| cut(line)).collect();
     let geometry = match parts.len() {
         0 => None,
-        1 => parts.into_iter().next().map(Geometry::new_line_string),
+        1 => parts.pop().map(Geometry::new_line_string),
         _ => Some(Geometry::new_multi_line_string(parts)),
     };
-    let mut feature = feature(kind, geometry);
-    feature.set_property("record_s", rounded(ground.time_ms.start as f64 / 1000.0, 3));
-    feature.set_property("distance_m", rounded(ground.distance_m.start, 3));
-    feature.set_property("length_m", rounded(length_m, 3));
-    (length_m > 0.0).then_some(feature)
+    let properties = vec![
+        ("record_s", rounded(ground.time_ms.start as f64 / 1000.0)),
+        ("distance_m", rounded(ground.distance_m.start)),
+        ("length_m", rounded(length_m)),
+    ];
+    (length_m > 0.0).then(|| feature(kind, geometry, properties))
 }
 
 /// A line, cut at the 180th meridian: RFC 7946, 3.1.9.
@@ -118,18 +109,12 @@ fn cut(line: &[Place]) -> Vec<Vec<Position>> {
     parts
 }
 
-/// Longitude before latitude, as in GeoJSON.
+/// Longitude before latitude, as in GeoJSON. The ninth decimal of a degree is 0.1 mm.
 fn position(place: Place) -> Position {
-    Position::from([rounded(place.longitude, DEGREE_DIGITS), rounded(place.latitude, DEGREE_DIGITS)])
+    Position::from([place.longitude, place.latitude].map(|degrees| (degrees * 1e9).round() / 1e9))
 }
 
-fn rounded(value: f64, digits: i32) -> f64 {
-    let factor = 10_f64.powi(digits);
-    (value * factor).round() / factor
-}
-
-/// A time in the form of ISO 8601, which QGIS accepts. `None` for an invalid date.
-fn utc(time_ms: i64) -> Option<String> {
-    let time = DateTime::from_timestamp_millis(time_ms)?;
-    Some(time.to_rfc3339_opts(chrono::SecondsFormat::Millis, true))
+/// Seconds or metres with three decimals.
+fn rounded(value: f64) -> JsonValue {
+    ((value * 1000.0).round() / 1000.0).into()
 }

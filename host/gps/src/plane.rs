@@ -4,10 +4,11 @@
 //! from there, on the ellipsoid of WGS84. Within 10 km of the origin distances are true to a part in a million, also
 //! over a pole and over the 180th meridian. The geodesics are geographiclib's.
 
+use derive_more::{Add, AddAssign, Div, Mul, Sub};
 use geographiclib_rs::{DirectGeodesic, Geodesic, InverseGeodesic};
 
 /// A position on the earth, on the ellipsoid of WGS84.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Place {
     /// Degrees to the north, -90 to 90.
     pub latitude: f64,
@@ -29,7 +30,7 @@ impl Place {
 }
 
 /// Metres on a [`Plane`], or the difference of two such positions.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Add, AddAssign, Clone, Copy, Debug, Default, Div, Mul, PartialEq, Sub)]
 pub struct Metres {
     /// To the east.
     pub east: f64,
@@ -38,19 +39,10 @@ pub struct Metres {
 }
 
 impl Metres {
-    /// These and others.
-    pub fn plus(self, other: Self) -> Self {
-        Self { east: self.east + other.east, north: self.north + other.north }
-    }
-
-    /// These without others.
-    pub fn minus(self, other: Self) -> Self {
-        self.plus(other.times(-1.0))
-    }
-
-    /// The vector times a factor.
-    pub fn times(self, factor: f64) -> Self {
-        Self { east: self.east * factor, north: self.north * factor }
+    /// A metre in a direction, in degrees from north to the east.
+    pub fn toward(degrees: f64) -> Self {
+        let (east, north) = degrees.to_radians().sin_cos();
+        Self { east, north }
     }
 
     /// How far that is.
@@ -82,8 +74,7 @@ impl Plane {
         let Place { latitude, longitude } = self.origin;
         let (length, azimuth, _, _): (f64, f64, f64, f64) =
             self.earth.inverse(latitude, longitude, place.latitude, place.longitude);
-        let (east, north) = azimuth.to_radians().sin_cos();
-        Metres { east, north }.times(length)
+        Metres::toward(azimuth) * length
     }
 
     /// The position at these coordinates.
@@ -119,7 +110,7 @@ mod tests {
             let plane = Plane::around(Place { latitude, longitude });
             let [one, other] = [Metres { east: to[0], north: to[1] }, Metres { east: to[2], north: to[3] }];
             let on_earth = plane.place(one).distance_m(plane.place(other));
-            prop_assert!((on_earth - other.minus(one).length()).abs() < 1e-4);
+            prop_assert!((on_earth - (other - one).length()).abs() < 1e-4);
         }
     }
 

@@ -18,7 +18,7 @@
 mod delay;
 mod heard;
 
-pub use self::heard::{Counts, Fix, Heard, Jump, Mark};
+pub use self::heard::{Counts, Fix, Jump, Mark};
 
 use self::delay::{LONGEST_DELAY_MS, LeastAhead};
 use crate::plane::Place;
@@ -52,7 +52,7 @@ const STEP_STAYS_MS: f64 = 2000.0;
 const STEP_JITTER_MS: f64 = 300.0;
 
 /// A moment, and the values received for it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Moment {
     arrived_ms: f64,
     utc_ms: i64,
@@ -94,9 +94,13 @@ struct Rolled {
 pub struct Receiver {
     /// The fix's standard deviation, if the user knows it.
     error_m: Option<f64>,
-    counts: Counts,
-    /// The results that are not returned yet.
-    heard: Heard,
+    /// The counts so far.
+    pub counts: Counts,
+    /// The complete fixes that the caller has not taken yet. Several come at once if earlier fixes had jumped and are
+    /// accepted after all.
+    pub fixes: Vec<Fix>,
+    /// The marks that the caller has not taken yet.
+    pub marks: Vec<Mark>,
     moment: Option<Moment>,
     /// Midnights since the first line.
     days: i64,
@@ -120,11 +124,6 @@ impl Receiver {
     /// metres. If it is `None`, the usual one of the reported quality is used.
     pub fn new(error_m: Option<f64>) -> Self {
         Self { error_m, ..Self::default() }
-    }
-
-    /// The counts so far.
-    pub fn counts(&self) -> Counts {
-        self.counts
     }
 
     /// The midnight from which the fixes' [`Fix::utc_ms`] counts, in milliseconds since the first of January 1970.
@@ -151,7 +150,7 @@ impl Receiver {
     }
 
     /// Takes a line that came at this time of the log's clock.
-    pub fn take(&mut self, time_ms: f64, line: &str) -> Heard {
+    pub fn take(&mut self, time_ms: f64, line: &str) {
         // A log of an earlier version has lines with several sentences, or with something in front.
         for sentence in Finder::all(line.as_bytes()) {
             match Line::parse(&sentence) {
@@ -160,22 +159,18 @@ impl Receiver {
                 Line::Damaged => self.counts.damaged += 1,
             }
         }
-        std::mem::take(&mut self.heard)
     }
 
     /// The end of the log: the last moment's fix is complete.
-    pub fn end(&mut self) -> Heard {
+    pub fn end(&mut self) {
         self.complete();
         self.release();
-        std::mem::take(&mut self.heard)
     }
 
     /// The receiver is gone or silent.
-    pub fn silent(&mut self) -> Heard {
-        self.complete();
-        self.release();
+    pub fn silent(&mut self) {
+        self.end();
         self.no_fix();
-        std::mem::take(&mut self.heard)
     }
 
     fn report(&mut self, arrived_ms: f64, report: Report) {
@@ -184,31 +179,17 @@ impl Receiver {
             self.complete();
             return self.no_fix();
         };
-        if let Some(moment) = &self.moment {
-            let before_ms = moment.utc_ms.rem_euclid(DAY_MS);
-            if before_ms == time_ms && arrived_ms - moment.arrived_ms < LONGEST_DELAY_MS {
-                return self.add(report);
-            }
+        let before_ms = self.moment.map(|moment| moment.utc_ms.rem_euclid(DAY_MS));
+        let is_near = |moment: Moment| arrived_ms - moment.arrived_ms < LONGEST_DELAY_MS;
+        if before_ms != Some(time_ms) || !self.moment.is_some_and(is_near) {
             // Past midnight forward, or back over it for a receiver that has only now found the time.
+            let before_ms = before_ms.unwrap_or(time_ms);
             self.days += i64::from(time_ms < before_ms - DAY_MS / 2) - i64::from(time_ms > before_ms + DAY_MS / 2);
+            self.complete();
+            let (utc_ms, wheel) = (self.days * DAY_MS + time_ms, self.wheel);
+            let new = Moment { arrived_ms, utc_ms, wheel, digit_m: f64::INFINITY, is_valid: true, ..Moment::default() };
+            self.moment = Some(new);
         }
-        self.complete();
-        let utc_ms = self.days * DAY_MS + time_ms;
-        self.moment = Some(Moment {
-            arrived_ms,
-            utc_ms,
-            place: None,
-            digit_m: f64::INFINITY,
-            is_valid: true,
-            quality: None,
-            wheel: self.wheel,
-            is_over: false,
-        });
-        self.add(report);
-    }
-
-    /// Adds the values of a sentence to its moment.
-    fn add(&mut self, report: Report) {
         if let Some(day) = report.day {
             *self.first_days.entry(day - self.days).or_default() += 1;
         }
@@ -224,7 +205,7 @@ impl Receiver {
         if self.has_fix != Some(false) {
             self.has_fix = Some(false);
             self.counts.losses += 1;
-            self.heard.marks.push(Mark::Lost);
+            self.marks.push(Mark::Lost);
         }
     }
 
@@ -238,7 +219,7 @@ impl Receiver {
         }
         if self.has_fix != Some(true) {
             self.has_fix = Some(true);
-            self.heard.marks.push(Mark::Found(moment.quality.unwrap_or(Quality::Satellites)));
+            self.marks.push(Mark::Found(moment.quality.unwrap_or(Quality::Satellites)));
         }
         self.time(moment);
     }
@@ -264,7 +245,7 @@ impl Receiver {
         // A time that goes back is a step in any case.
         if first.utc_ms < self.timed_utc_ms || (has_stayed && is_whole) {
             self.least_ahead.forget();
-            self.heard.marks.push(Mark::Stepped(rise_s));
+            self.marks.push(Mark::Stepped(rise_s));
         }
         if has_stayed || self.least_ahead.ms().is_none() {
             self.release();
@@ -295,21 +276,18 @@ impl Receiver {
             wheel.rolled_m + wheel.speed_mm_s / 1000.0 * since_s
         });
         let here = Rolled { fix, rolled_m };
-        let Some(last) = self.last.filter(|_| wheel.is_some()) else {
-            self.jumped.clear();
-            return self.accept(here);
-        };
         // As the wheel rolls on, the machine could have reached the position of the jumped fixes. But these agree with
         // each other.
         let agrees = self.jumped.last().is_some_and(|jumped| Self::follows(jumped, &here));
-        if !agrees && Self::follows(&last, &here) {
+        let has_jumped = |last: &Rolled| wheel.is_some() && (agrees || !Self::follows(last, &here));
+        let Some(last) = self.last.filter(has_jumped) else {
             self.jumped.clear();
             return self.accept(here);
-        }
+        };
         self.counts.jumps += 1;
         let far_m = last.fix.place.distance_m(fix.place);
         let rolled_m = (rolled_m - last.rolled_m).abs();
-        self.heard.marks.push(Mark::Jumped(Jump { place: fix.place, time_ms: fix.time_ms, far_m, rolled_m }));
+        self.marks.push(Mark::Jumped(Jump { place: fix.place, time_ms: fix.time_ms, far_m, rolled_m }));
         if !agrees {
             self.jumped.clear();
         }
@@ -317,7 +295,7 @@ impl Receiver {
         let agree_ms = self.jumped.first().map_or(0.0, |first| fix.time_ms - first.fix.time_ms);
         if self.jumped.len() >= AGREEING && agree_ms >= AGREEING_MS {
             self.track += 1;
-            self.heard.marks.push(Mark::Stayed);
+            self.marks.push(Mark::Stayed);
             for mut jumped in std::mem::take(&mut self.jumped) {
                 jumped.fix.track = self.track;
                 self.accept(jumped);
@@ -334,7 +312,7 @@ impl Receiver {
 
     fn accept(&mut self, here: Rolled) {
         self.counts.fixes += 1;
-        self.heard.fixes.push(here.fix);
+        self.fixes.push(here.fix);
         self.last = Some(here);
     }
 }
@@ -362,34 +340,20 @@ mod tests {
 
     /// A receiver that rolls half a metre a second to the east of a position. It sends a fix once a second from a
     /// moment on. `change` gets the number of each second and its two lines.
-    fn rolling(
-        from: Place,
-        start_ms: i64,
-        seconds: i64,
-        change: impl Fn(i64, [String; 2]) -> [String; 2],
-    ) -> (Vec<Heard>, Receiver) {
+    fn rolling(from: Place, start_ms: i64, seconds: i64, change: impl Fn(i64, [String; 2]) -> [String; 2]) -> Receiver {
         let plane = Plane::around(from);
         let mut receiver = Receiver::new(None);
-        let mut heard = Vec::new();
         for second in 0..seconds {
             let utc_ms = start_ms + 1000 * second;
             let place = plane.place(Metres { east: 0.5 * second as f64, north: 0.0 });
             let time_ms = 1000.0 * second as f64;
             receiver.rolled(time_ms, 0.5 * second as f64, 500.0);
             for line in change(second, [gga(utc_ms, place), rmc(utc_ms, place)]) {
-                heard.push(receiver.take(time_ms + 80.0, &line));
+                receiver.take(time_ms + 80.0, &line);
             }
         }
-        heard.push(receiver.end());
-        (heard, receiver)
-    }
-
-    fn fixes(heard: &[Heard]) -> Vec<Fix> {
-        heard.iter().flat_map(|heard| &heard.fixes).copied().collect()
-    }
-
-    fn marks(heard: &[Heard]) -> Vec<Mark> {
-        heard.iter().flat_map(|heard| &heard.marks).copied().collect()
+        receiver.end();
+        receiver
     }
 
     proptest! {
@@ -399,11 +363,11 @@ mod tests {
         ) {
             let longitude = [180.0 - off.abs(), -180.0 + off.abs(), off, 100.0][near];
             let start_ms = (DAY + 1) * DAY_MS + 1000 * start_s;
-            let (heard, receiver) = rolling(Place { latitude, longitude }, start_ms, 40, |_, lines| lines);
-            let fixes = fixes(&heard);
+            let receiver = rolling(Place { latitude, longitude }, start_ms, 40, |_, lines| lines);
+            let Receiver { fixes, marks, .. } = &receiver;
             prop_assert_eq!(fixes.len(), 40);
-            prop_assert_eq!(receiver.counts(), Counts { fixes: 40, ..Counts::default() });
-            prop_assert_eq!(marks(&heard), vec![Mark::Found(Quality::Rtk)]);
+            prop_assert_eq!(receiver.counts, Counts { fixes: 40, ..Counts::default() });
+            prop_assert_eq!(marks, &[Mark::Found(Quality::Rtk)]);
             let midnight_ms = receiver.midnight_ms().expect("RMC has a date");
             for (second, pair) in fixes.windows(2).enumerate() {
                 prop_assert_eq!(midnight_ms + pair[0].utc_ms, start_ms + 1000 * second as i64);
@@ -425,11 +389,11 @@ mod tests {
             // A checksum has 8 bits, so of 256 seams one looks like a whole line.
             let is_known = |line: &str| stream.lines().any(|whole| whole == line) || Line::parse(line) == Line::Damaged;
             prop_assume!(cut.lines().all(is_known));
-            let heard: Vec<Heard> = cut.lines().enumerate().map(|(at, line)| receiver.take(500.0 * at as f64, line)).collect();
-            for fix in fixes(&heard) {
+            cut.lines().enumerate().for_each(|(at, line)| receiver.take(500.0 * at as f64, line));
+            for fix in &receiver.fixes {
                 prop_assert!(fix.place.distance_m(FIELD) < 1e-3);
             }
-            prop_assert!(receiver.counts().damaged <= 1);
+            prop_assert!(receiver.counts.damaged <= 1);
         }
     }
 
@@ -439,12 +403,11 @@ mod tests {
         let cases = [(20, 1.0, [0.0, 300.0, 35.0, 1900.0], 1e-6), (7200, 1.0001, [0.0; 4], 12.1)];
         for (seconds, pace, late_ms, within_ms) in cases {
             let mut receiver = Receiver::new(None);
-            let line = |second: i64| {
+            for second in 0..seconds {
                 let due_ms = 1000.0 * pace * second as f64 + 70.0;
-                receiver.take(due_ms + late_ms[second as usize % late_ms.len()], &gga(1000 * second, FIELD))
-            };
-            let heard: Vec<Heard> = (0..seconds).map(line).collect();
-            for fix in fixes(&heard) {
+                receiver.take(due_ms + late_ms[second as usize % late_ms.len()], &gga(1000 * second, FIELD));
+            }
+            for fix in &receiver.fixes {
                 let true_ms = pace * fix.utc_ms as f64 + 70.0;
                 assert!((fix.time_ms - true_ms).abs() <= within_ms, "{fix:?}");
             }
@@ -457,44 +420,33 @@ mod tests {
             let none = framed(&simulated::rmc(1000 * second, None));
             if (10..15).contains(&second) { [none.clone(), none] } else { lines }
         };
-        let (heard, receiver) = rolling(FIELD, 0, 30, lost);
-        assert_eq!(marks(&heard), [Mark::Found(Quality::Rtk), Mark::Lost, Mark::Found(Quality::Rtk)]);
-        assert_eq!(receiver.counts(), Counts { fixes: 25, losses: 1, jumps: 0, damaged: 0 });
+        let receiver = rolling(FIELD, 0, 30, lost);
+        assert_eq!(receiver.marks, [Mark::Found(Quality::Rtk), Mark::Lost, Mark::Found(Quality::Rtk)]);
+        assert_eq!(receiver.counts, Counts { fixes: 25, losses: 1, jumps: 0, damaged: 0 });
     }
 
-    /// As [`rolling`], with the fixes of some seconds two metres off.
-    fn off(seconds: std::ops::Range<i64>) -> (Vec<Heard>, Receiver) {
+    #[test]
+    fn fixes_that_jump_are_marked_and_used_only_if_they_stay_there() {
         let plane = Plane::around(FIELD);
-        rolling(FIELD, 0, 30, |second, lines| {
-            let place = plane.place(Metres { east: 0.5 * second as f64, north: 2.0 });
-            if seconds.contains(&second) { [gga(1000 * second, place), rmc(1000 * second, place)] } else { lines }
-        })
-    }
-
-    #[test]
-    fn fixes_that_jump_and_come_back_are_marked_and_not_used() {
-        let (heard, receiver) = off(10..13);
-        assert_eq!(receiver.counts(), Counts { fixes: 27, losses: 0, jumps: 3, damaged: 0 });
-        let jumped = marks(&heard).into_iter().filter(|mark| matches!(mark, Mark::Jumped(jump) if jump.far_m >= 2.0));
-        assert_eq!(jumped.count(), 3);
-        assert!(fixes(&heard).iter().all(|fix| fix.track == 0));
-    }
-
-    #[test]
-    fn fixes_that_stay_where_they_have_jumped_to_are_another_track() {
-        let (heard, receiver) = off(10..30);
-        assert_eq!(receiver.counts(), Counts { fixes: 30, losses: 0, jumps: 11, damaged: 0 });
-        assert_eq!(marks(&heard).last(), Some(&Mark::Stayed));
-        let tracks: Vec<u32> = fixes(&heard).iter().map(|fix| fix.track).collect();
-        assert_eq!(tracks, [vec![0; 10], vec![1; 20]].concat());
+        for (off, jumps, tracks) in [(10..13, 3, vec![0; 27]), (10..30, 11, [vec![0; 10], vec![1; 20]].concat())] {
+            let receiver = rolling(FIELD, 0, 30, |second, lines| {
+                let place = plane.place(Metres { east: 0.5 * second as f64, north: 2.0 });
+                if off.contains(&second) { [gga(1000 * second, place), rmc(1000 * second, place)] } else { lines }
+            });
+            assert_eq!(receiver.counts, Counts { fixes: tracks.len() as u64, jumps, ..Counts::default() });
+            let Receiver { fixes, marks, .. } = &receiver;
+            let jumped = |mark: &&Mark| matches!(mark, Mark::Jumped(jump) if jump.far_m >= 2.0);
+            assert_eq!(marks.iter().filter(jumped).count() as u64, jumps);
+            assert_eq!(marks.last() == Some(&Mark::Stayed), tracks.contains(&1));
+            assert_eq!(fixes.iter().map(|fix| fix.track).collect::<Vec<_>>(), tracks);
+        }
     }
 
     #[test]
     fn a_receiver_without_a_fix_from_the_beginning_is_marked_so() {
         let mut receiver = Receiver::new(None);
-        let heard: Vec<Heard> =
-            (0..5).map(|second| receiver.take(1000.0 * f64::from(second), &framed("GPRMC,,V,,,,,,,,,,N"))).collect();
-        assert_eq!(marks(&heard), [Mark::Lost]);
+        (0..5).for_each(|second| receiver.take(1000.0 * f64::from(second), &framed("GPRMC,,V,,,,,,,,,,N")));
+        assert_eq!(receiver.marks, [Mark::Lost]);
         assert_eq!(receiver.midnight_ms(), None);
     }
 }

@@ -6,7 +6,7 @@
 //! [`Recorder::lost`].
 
 use crate::antenna::Antenna;
-use crate::receiver::{Heard, Receiver};
+use crate::receiver::Receiver;
 use crate::sentence::{Finder, Line};
 use link::session::Happening;
 use logbook::follower::{Distance, tick_mm};
@@ -60,8 +60,7 @@ impl Recorder {
             Happening::Lost(_) => self.wheel_lost(),
             Happening::Status(status, _) => {
                 if !self.distance.take(status.position, self.tick_mm) {
-                    self.wheel_lost();
-                    self.distance.take(status.position, self.tick_mm);
+                    self.receiver.wheel_lost();
                 }
                 let rolled_m = self.distance.at(status.position, self.tick_mm).unwrap_or_default() / 1000.0;
                 self.receiver.rolled(time_ms as f64, rolled_m, f64::from(status.speed_mm_s));
@@ -85,9 +84,8 @@ impl Recorder {
     /// It is gone; why.
     pub fn lost(&mut self, why: &str) -> Lines {
         self.heard_ms = None;
-        let mut lines = vec![(Kind::GpsLost, why.to_owned())];
-        lines.extend(marks(&self.receiver.silent()));
-        lines
+        self.receiver.silent();
+        [(Kind::GpsLost, why.to_owned())].into_iter().chain(self.marks()).collect()
     }
 
     /// Takes received bytes, or none.
@@ -109,9 +107,9 @@ impl Recorder {
                     Kind::Gps
                 }
             };
-            let heard = self.receiver.take(time_ms as f64, &sentence);
+            self.receiver.take(time_ms as f64, &sentence);
             lines.push((kind, sentence));
-            lines.extend(marks(&heard));
+            lines.extend(self.marks());
         }
         let is_past =
             |since_ms: Option<u64>, limit_ms| since_ms.is_some_and(|ms| time_ms.saturating_sub(ms) > limit_ms);
@@ -128,12 +126,13 @@ impl Recorder {
 
     /// The counts so far.
     pub fn counts(&self) -> crate::receiver::Counts {
-        self.receiver.counts()
+        self.receiver.counts
     }
-}
 
-fn marks(heard: &Heard) -> Lines {
-    heard.marks.iter().map(|mark| (Kind::GpsMark, mark.to_string())).collect()
+    fn marks(&mut self) -> impl Iterator<Item = (Kind, String)> {
+        self.receiver.fixes.clear();
+        self.receiver.marks.drain(..).map(|mark| (Kind::GpsMark, mark.to_string()))
+    }
 }
 
 #[cfg(test)]
@@ -141,6 +140,12 @@ mod tests {
     use super::*;
 
     const GGA: &str = "$GPGGA,092750.000,5321.6802,N,00630.3372,W,1,8,1.03,61.7,M,55.2,M,,*76";
+
+    fn connected() -> Recorder {
+        let (mut recorder, _) = Recorder::new(&Antenna::default());
+        recorder.found(0, "a port");
+        recorder
+    }
 
     fn kinds(lines: &Lines) -> Vec<Kind> {
         lines.iter().map(|(kind, _)| *kind).collect()
@@ -150,8 +155,7 @@ mod tests {
     fn lines_are_kept_however_they_come_in_pieces_and_damaged_ones_too() {
         let stream = format!("80.1,M*12\r\n{GGA}\r\n$GPGSV,3,1,09*00\r\n{}\r\n{GGA}\r\n", GGA.replace("5321", "5322"));
         for length in 1..60 {
-            let (mut recorder, _) = Recorder::new(&Antenna::default());
-            recorder.found(0, "a port");
+            let mut recorder = connected();
             let lines: Lines = stream.as_bytes().chunks(length).flat_map(|piece| recorder.take(10, piece)).collect();
             assert_eq!(kinds(&lines), [Kind::Gps, Kind::GpsDamaged, Kind::GpsDamaged, Kind::Gps], "{length}");
             assert_eq!(lines[0].1, GGA);
@@ -161,8 +165,7 @@ mod tests {
     #[test]
     fn bytes_without_a_position_are_reported_once_after_5_s() {
         for (bytes, advice) in [(&b"\x80x\xFF\n"[..], "--gps-baud"), (&b"$GPGSV,1,1,00*79\r\n"[..], "RMC or GGA")] {
-            let (mut recorder, _) = Recorder::new(&Antenna::default());
-            recorder.found(0, "a port");
+            let mut recorder = connected();
             let lines: Lines = (0..200).flat_map(|tenth| recorder.take(100 * tenth, bytes)).collect();
             assert_eq!(kinds(&lines), [Kind::GpsMark], "{lines:?}");
             assert!(lines[0].1.contains(advice), "{lines:?}");
@@ -171,8 +174,7 @@ mod tests {
 
     #[test]
     fn a_receiver_that_falls_silent_is_lost_once_and_so_is_its_fix() {
-        let (mut recorder, _) = Recorder::new(&Antenna::default());
-        recorder.found(0, "a port");
+        let mut recorder = connected();
         recorder.take(100, format!("{GGA}\r\n").as_bytes());
         let later: Vec<Lines> = (1..10).map(|second| recorder.take(1000 * second, b"")).collect();
         let told: Lines = later.into_iter().flatten().collect();
@@ -183,15 +185,11 @@ mod tests {
 
     #[test]
     fn the_antenna_s_line_in_a_record_is_read_again() {
+        let default = Antenna::default();
         for antenna in [
-            Antenna::default(),
-            Antenna { beam_ahead_mm: -250.5, beam_right_mm: 30.0, delay_ms: 80.0, ..Antenna::default() },
-            Antenna {
-                tool_ahead_mm: Some(-700.0),
-                tool_right_mm: Some(-5.0),
-                error_mm: Some(20.0),
-                ..Antenna::default()
-            },
+            default,
+            Antenna { beam_ahead_mm: -250.5, beam_right_mm: 30.0, delay_ms: 80.0, ..default },
+            Antenna { tool_ahead_mm: Some(-700.0), tool_right_mm: Some(-5.0), error_mm: Some(20.0), ..default },
         ] {
             let (_, lines) = Recorder::new(&antenna);
             assert_eq!(Antenna::parse(&lines[0].1), Some(antenna));

@@ -269,19 +269,6 @@ mod tests {
     const RMC: &str = "GPRMC,225446.00,A,4916.45,S,17959.99,E,000.5,054.7,191194,020.3,E,A";
 
     #[test]
-    fn place_time_and_quality_are_read_of_either_sentence() {
-        let gga = report(GGA);
-        let place = gga.place.expect("there is a fix");
-        assert!((place.latitude - 53.361_336_7).abs() < 1e-6 && (place.longitude + 6.505_62).abs() < 1e-6, "{place:?}");
-        assert_eq!((gga.time_ms, gga.day, gga.quality), (Some(34_070_250), None, Some(Quality::Rtk)));
-        let rmc = report(RMC);
-        let place = rmc.place.expect("there is a fix");
-        assert!((place.latitude + 49.274_166_7).abs() < 1e-6 && (place.longitude - 179.999_833_3).abs() < 1e-6);
-        // A date before 2020 is none.
-        assert_eq!((rmc.day, rmc.quality), (None, Some(Quality::Satellites)));
-    }
-
-    #[test]
     fn without_satellites_there_is_no_place() {
         for text in [
             "GPRMC,225446.00,V,,,,,,,191194,,,N",
@@ -302,6 +289,9 @@ mod tests {
     #[test]
     fn a_quality_is_in_its_own_field_and_a_date_that_cannot_be_is_none() {
         for (text, quality, day) in [
+            (GGA, Some(Quality::Rtk), None),
+            // A date before 2020 is none.
+            (RMC, Some(Quality::Satellites), None),
             ("GNRMC,101500,A,5130.0,N,00006.0,E,1.35,90.0,140626,,E,R", Some(Quality::Rtk), Some(20_618)),
             ("GNRMC,101500,A,5130.0,N,00006.0,E,1.35,90.0,000000,,,F", Some(Quality::FloatRtk), None),
             ("GNRMC,101500,A,5130.0,N,00006.0,E,1.35,90.0,140699", None, None),

@@ -103,9 +103,8 @@ impl SimulatedReceiver {
     }
 
     fn metres(&self, distance_m: f64, beside: Offset) -> Metres {
-        let (east, north) = self.setup.direction_degrees.to_radians().sin_cos();
-        let forward = Metres { east, north };
-        forward.times(distance_m + beside.ahead_m).plus(forward.turned_right().times(beside.right_m))
+        let forward = Metres::toward(self.setup.direction_degrees);
+        forward * distance_m + beside.along(forward)
     }
 
     /// The bytes up to this time, in seconds since the Uno was powered up. `distance_m` returns the distance travelled at a
@@ -127,8 +126,8 @@ impl SimulatedReceiver {
     fn sentences(&mut self, moment_s: f64, distance_m: f64) -> [String; 2] {
         let Offset { ahead_m, right_m } = self.setup.beam;
         let mut at = self.metres(distance_m, Offset { ahead_m: -ahead_m, right_m: -right_m });
-        let error_m = self.setup.error_mm / 1000.0;
-        at = at.plus(Metres { east: self.normal(), north: self.normal() }.times(error_m));
+        let mut normal = || StandardNormal.sample(&mut self.noise);
+        at += Metres { east: normal(), north: normal() } * (self.setup.error_mm / 1000.0);
         let mut has_fix = true;
         if let Some(trouble) = &self.setup.trouble {
             let second = moment_s.rem_euclid(trouble.every_s);
@@ -148,10 +147,6 @@ impl SimulatedReceiver {
         [rmc(utc_ms, fix), gga(utc_ms, fix)]
     }
 
-    fn normal(&mut self) -> f64 {
-        StandardNormal.sample(&mut self.noise)
-    }
-
     /// A sentence's line, as sent.
     fn sent(&mut self, text: String) -> Vec<u8> {
         let mut bytes = framed(&text).into_bytes();
@@ -168,21 +163,17 @@ impl SimulatedReceiver {
 /// The text of RMC for a moment, in milliseconds from 1970, UTC. `None` for a receiver without a fix.
 pub fn rmc(utc_ms: i64, fix: Option<(Place, Quality)>) -> String {
     let moment = moment(utc_ms);
-    let (clock, date) = (moment.format(CLOCK), moment.format("%d%m%y"));
+    let (clock, date) = (moment.format("%H%M%S%.3f"), moment.format("%d%m%y"));
     let Some((place, quality)) = fix else { return format!("GNRMC,{clock},V,,,,,,,{date},,,N") };
     format!("GNRMC,{clock},A,{},,,{date},,,{}", coordinates(place), codes(quality).0)
 }
 
 /// The text of GGA, as [`rmc`].
 pub fn gga(utc_ms: i64, fix: Option<(Place, Quality)>) -> String {
-    let moment = moment(utc_ms);
-    let clock = moment.format(CLOCK);
+    let clock = moment(utc_ms).format("%H%M%S%.3f");
     let Some((place, quality)) = fix else { return format!("GNGGA,{clock},,,,,0,00,99.9,,M,,M,,") };
     format!("GNGGA,{clock},{},{},14,0.7,60.0,M,46.0,M,,", coordinates(place), codes(quality).1)
 }
-
-/// The time of day in a sentence.
-const CLOCK: &str = "%H%M%S%.3f";
 
 fn moment(utc_ms: i64) -> DateTime<Utc> {
     DateTime::from_timestamp_millis(utc_ms).unwrap_or_default()

@@ -130,6 +130,7 @@ impl Summary {
         }
         summary.weeded_percent = (summary.worked_m > 0.0).then(|| 100.0 * summary.weeded_m / summary.worked_m);
         summary.area_ha = summary.worked_m * stand.row_spacing_mm / 1000.0 / 10_000.0;
+        let hours = |time_ms: u64| time_ms as f64 / 3_600_000.0;
         summary.work_h = hours(work_ms);
         summary.record_h = hours(record_ms);
         summary.count_spacings(&spacings_mm(job), stand);
@@ -139,28 +140,16 @@ impl Summary {
     fn count_spacings(&mut self, spacings_mm: &[f64], stand: &Stand) {
         let mut sorted = spacings_mm.to_vec();
         sorted.sort_by(f64::total_cmp);
-        let Some(usual_mm) = stand.spacing_mm.or_else(|| sorted.get(sorted.len() / 2).copied()) else { return };
-        if usual_mm <= 0.0 {
-            return;
-        }
-        let whole = |spacing_mm: &f64| (spacing_mm / usual_mm).round().max(1.0) as u64;
-        self.missing = spacings_mm.iter().filter(|&spacing| *spacing > GAP * usual_mm).map(|to| whole(to) - 1).sum();
-        let single: Vec<f64> = spacings_mm.iter().copied().filter(|&spacing| spacing <= GAP * usual_mm).collect();
+        let usual_mm = stand.spacing_mm.or_else(|| sorted.get(sorted.len() / 2).copied());
+        let Some(usual_mm) = usual_mm.filter(|&usual_mm| usual_mm > 0.0) else { return };
+        let (single, gaps): (Vec<f64>, Vec<f64>) = spacings_mm.iter().partition(|&&spacing| spacing <= GAP * usual_mm);
+        self.missing = gaps.iter().map(|gap| (gap / usual_mm).round() as u64 - 1).sum();
         let count = single.len() as f64;
-        if single.is_empty() {
-            return;
-        }
         let mean = single.iter().sum::<f64>() / count;
-        self.spacing_mean_mm = Some(mean);
-        if single.len() > 1 {
-            let squares: f64 = single.iter().map(|spacing| (spacing - mean).powi(2)).sum();
-            self.spacing_scatter_mm = Some((squares / (count - 1.0)).sqrt());
-        }
+        let squares: f64 = single.iter().map(|spacing| (spacing - mean).powi(2)).sum();
+        self.spacing_mean_mm = (count > 0.0).then_some(mean);
+        self.spacing_scatter_mm = (count > 1.0).then(|| (squares / (count - 1.0)).sqrt());
     }
-}
-
-fn hours(time_ms: u64) -> f64 {
-    time_ms as f64 / 3_600_000.0
 }
 
 /// The distances between neighbouring plants, in mm, if the machine was at work from one to the other.
@@ -171,17 +160,10 @@ fn spacings_mm(job: &Job) -> Vec<f64> {
             |event: &&Event| matches!(event.kind, EventKind::Detection { class: Class::Plant | Class::Unknown, .. });
         let plants: Vec<f64> = stretch.events.iter().filter(is_plant).map(|plant| plant.distance_m).collect();
         // Both are known by the wheel's distance.
-        let rests: Vec<_> = stretch.ground.iter().filter(|ground| ground.did == Did::Rolled).collect();
-        for pair in plants.windows(2) {
-            let is_between = |distance_m: f64| (pair[0]..pair[1]).contains(&distance_m);
-            let rested = rests.iter().any(|rest| {
-                let contains_both = rest.distance_m.start <= pair[0] && pair[1] <= rest.distance_m.end;
-                contains_both || is_between(rest.distance_m.start) || is_between(rest.distance_m.end)
-            });
-            if !rested && pair[1] > pair[0] {
-                spacings.push(1000.0 * (pair[1] - pair[0]));
-            }
-        }
+        let rests = || stretch.ground.iter().filter(|ground| ground.did == Did::Rolled).map(|rest| &rest.distance_m);
+        let is_spacing =
+            |pair: &&[f64]| pair[1] > pair[0] && !rests().any(|rest| rest.start < pair[1] && pair[0] <= rest.end);
+        spacings.extend(plants.windows(2).filter(is_spacing).map(|pair| 1000.0 * (pair[1] - pair[0])));
     }
     spacings
 }

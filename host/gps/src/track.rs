@@ -49,6 +49,13 @@ pub struct Offset {
     pub right_m: f64,
 }
 
+impl Offset {
+    /// The same to the east and north, if `forward` is a metre in the machine's direction.
+    pub(crate) fn along(self, forward: Metres) -> Metres {
+        forward * self.ahead_m + forward.turned_right() * self.right_m
+    }
+}
+
 /// How a position was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr)]
 #[strum(serialize_all = "snake_case")]
@@ -92,15 +99,13 @@ pub struct Found {
     pub utc_ms: i64,
 }
 
-/// A fix on the track.
+/// A fix on the track, or the mean of several of a standing wheel.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Station {
-    pub(crate) time_ms: f64,
-    utc_ms: i64,
+    /// The first of them, with the greatest of their errors.
+    pub(crate) fix: Fix,
     pub(crate) distance_m: f64,
     pub(crate) at: Metres,
-    pub(crate) error_m: f64,
-    pub(crate) track: u32,
     /// Number of fixes in its mean.
     fixes: f64,
     /// Time of the last of them.
@@ -111,50 +116,33 @@ pub(crate) struct Station {
 #[derive(Clone, Debug)]
 pub struct Track {
     plane: Plane,
-    stations: Vec<Station>,
+    pub(crate) stations: Vec<Station>,
     interval_ms: f64,
     longest_outage_m: f64,
 }
 
 impl Track {
-    /// The track through these fixes in order of time, each with the wheel's distance in metres. `None` without a fix.
-    pub fn through(fixes: &[(f64, Fix)], longest_outage_m: f64) -> Option<Self> {
-        let plane = Plane::around(fixes.first()?.1.place);
+    /// The track through these fixes in order of time, each with the wheel's distance in metres.
+    pub fn through(fixes: &[(f64, Fix)], longest_outage_m: f64) -> Self {
+        let plane = Plane::around(fixes.first().map_or(Place::default(), |(_, fix)| fix.place));
         let mut stations: Vec<Station> = Vec::with_capacity(fixes.len());
-        let mut intervals = Vec::new();
         for &(distance_m, fix) in fixes {
             let at = plane.metres(fix.place);
-            let station = Station {
-                time_ms: fix.time_ms,
-                utc_ms: fix.utc_ms,
-                distance_m,
-                at,
-                error_m: fix.error_m,
-                track: fix.track,
-                fixes: 1.0,
-                until_ms: fix.time_ms,
-            };
-            let Some(last) = stations.last_mut() else {
-                stations.push(station);
-                continue;
-            };
-            intervals.push(fix.time_ms - last.until_ms);
-            if last.track == fix.track && (distance_m - last.distance_m).abs() < STANDING_M {
+            let stands =
+                |last: &&mut Station| last.fix.track == fix.track && (distance_m - last.distance_m).abs() < STANDING_M;
+            if let Some(last) = stations.last_mut().filter(stands) {
                 last.fixes += 1.0;
-                last.at = last.at.plus(at.minus(last.at).times(1.0 / last.fixes));
-                last.error_m = last.error_m.max(fix.error_m);
+                last.at += (at - last.at) / last.fixes;
+                last.fix.error_m = last.fix.error_m.max(fix.error_m);
                 last.until_ms = fix.time_ms;
             } else {
-                stations.push(station);
+                stations.push(Station { fix, distance_m, at, fixes: 1.0, until_ms: fix.time_ms });
             }
         }
+        let mut intervals: Vec<f64> = fixes.windows(2).map(|pair| pair[1].1.time_ms - pair[0].1.time_ms).collect();
         intervals.sort_by(f64::total_cmp);
         let interval_ms = intervals.get(intervals.len() / 2).copied().unwrap_or(f64::INFINITY);
-        Some(Self { plane, stations, interval_ms, longest_outage_m })
-    }
-
-    pub(crate) fn stations(&self) -> &[Station] {
-        &self.stations
+        Self { plane, stations, interval_ms, longest_outage_m }
     }
 
     /// The position of an event with this offset from the antenna, at this distance of the wheel. It was recorded at
@@ -165,33 +153,33 @@ impl Track {
     pub fn find(&self, distance_m: f64, recorded_ms: f64, offset: Offset) -> Result<Found, Missing> {
         let first = self.passed(distance_m, recorded_ms)?;
         let (from, to) = (&self.stations[first], &self.stations[first + 1]);
-        if from.track != to.track {
+        if from.fix.track != to.fix.track {
             return Err(Missing::Jumped);
         }
-        let basis = if self.follow(from, to) { Basis::Measured } else { Basis::Interpolated };
-        if basis == Basis::Interpolated && (to.distance_m - from.distance_m).abs() > self.longest_outage_m {
+        let is_outage = to.fix.time_ms - from.until_ms > INTERVALS * self.interval_ms;
+        let basis = if is_outage { Basis::Interpolated } else { Basis::Measured };
+        if is_outage && (to.distance_m - from.distance_m).abs() > self.longest_outage_m {
             return Err(Missing::OutageTooLong);
         }
         let share = (distance_m - from.distance_m) / (to.distance_m - from.distance_m);
-        let antenna = from.at.plus(to.at.minus(from.at).times(share));
-        let mut error_m = from.error_m.max(to.error_m);
-        let mut at = antenna;
+        let mut at = from.at + (to.at - from.at) * share;
+        let mut error_m = from.fix.error_m.max(to.fix.error_m);
         let beside_m = offset.ahead_m.hypot(offset.right_m);
         if beside_m > 0.0 {
             let (forward, heading_error) = self.heading(first, distance_m).ok_or(Missing::NoHeading)?;
-            at = at.plus(forward.times(offset.ahead_m)).plus(forward.turned_right().times(offset.right_m));
+            at += offset.along(forward);
             error_m = error_m.hypot(beside_m * heading_error);
         }
         // The wheel stands at the beginning of the pair, and at its end.
-        let began = from.utc_ms as f64 + (from.until_ms - from.time_ms);
-        let utc_ms = began + share * (to.utc_ms as f64 - began);
+        let began = from.fix.utc_ms as f64 + (from.until_ms - from.fix.time_ms);
+        let utc_ms = began + share * (to.fix.utc_ms as f64 - began);
         Ok(Found { place: self.plane.place(at), basis, error_m, utc_ms: utc_ms.round() as i64 })
     }
 
     /// The first of the two fixes between which the wheel passed this distance for the last time before the event was
     /// recorded.
     fn passed(&self, distance_m: f64, recorded_ms: f64) -> Result<usize, Missing> {
-        let before = self.stations.partition_point(|station| station.time_ms <= recorded_ms + RECORDED_EARLY_MS);
+        let before = self.stations.partition_point(|station| station.fix.time_ms <= recorded_ms + RECORDED_EARLY_MS);
         for first in (0..before).rev() {
             let from_m = self.stations[first].distance_m;
             let Some(to) = self.stations.get(first + 1) else { continue };
@@ -211,17 +199,12 @@ impl Track {
         Err(if distance_m > farthest && before > 0 { Missing::NoFixBehind } else { Missing::NoFixBefore })
     }
 
-    /// Whether two fixes are successive, without an outage.
-    fn follow(&self, from: &Station, to: &Station) -> bool {
-        to.time_ms - from.until_ms <= INTERVALS * self.interval_ms
-    }
-
     /// The machine's heading between a fix and the next, as a metre forward, and its standard deviation in radians.
     fn heading(&self, first: usize, distance_m: f64) -> Option<(Metres, f64)> {
         let stations = &self.stations;
-        let track = stations[first].track;
+        let track = stations[first].fix.track;
         let is_in = |station: &Station| {
-            station.track == track && (station.distance_m - distance_m).abs() <= LONGEST_CHORD_M / 2.0
+            station.fix.track == track && (station.distance_m - distance_m).abs() <= LONGEST_CHORD_M / 2.0
         };
         let (mut begin, mut end) = (first, first + 2);
         let mut line = Fitted::default();
@@ -236,7 +219,7 @@ impl Track {
             let error = best.heading_error();
             if error <= HEADING_ERROR || (behind.is_none() && ahead.is_none()) {
                 let length = best.slope().length();
-                return (error <= NO_HEADING && length > 0.0).then(|| (best.slope().times(1.0 / length), error));
+                return (error <= NO_HEADING && length > 0.0).then(|| (best.slope() / length, error));
             }
             behind.into_iter().for_each(|at| line.add(&stations[at]));
             ahead.into_iter().for_each(|station| line.add(station));
@@ -251,8 +234,10 @@ impl Track {
 pub(crate) struct Fitted {
     /// The first fix, from which the others count.
     origin: Option<(f64, Metres)>,
-    count: f64,
-    error_m: f64,
+    /// Number of fixes.
+    pub(crate) count: f64,
+    /// The greatest error of a fix.
+    pub(crate) error_m: f64,
     /// Sums of distances and positions, and of their squares and products.
     distance: f64,
     at: Metres,
@@ -266,25 +251,15 @@ impl Fitted {
     /// Adds a fix.
     pub(crate) fn add(&mut self, station: &Station) {
         let (distance_m, at) = *self.origin.get_or_insert((station.distance_m, station.at));
-        let (distance, at) = (station.distance_m - distance_m, station.at.minus(at));
+        let (distance, at) = (station.distance_m - distance_m, station.at - at);
         self.count += 1.0;
-        self.error_m = self.error_m.max(station.error_m);
+        self.error_m = self.error_m.max(station.fix.error_m);
         self.distance += distance;
-        self.at = self.at.plus(at);
+        self.at += at;
         self.distance_distance += distance * distance;
-        self.distance_at = self.distance_at.plus(at.times(distance));
-        self.at_at = self.at_at.plus(Metres { east: at.east * at.east, north: at.north * at.north });
+        self.distance_at += at * distance;
+        self.at_at += Metres { east: at.east * at.east, north: at.north * at.north };
         self.east_north += at.east * at.north;
-    }
-
-    /// Number of fixes.
-    pub(crate) fn count(&self) -> f64 {
-        self.count
-    }
-
-    /// The greatest error of a fix.
-    pub(crate) fn error_m(&self) -> f64 {
-        self.error_m
     }
 
     /// The sum of the squared distances from their mean.
@@ -294,13 +269,12 @@ impl Fitted {
 
     /// Metres to the east and north for each metre of the wheel.
     pub(crate) fn slope(&self) -> Metres {
-        let products = self.distance_at.minus(self.at.times(self.distance / self.count));
-        products.times(1.0 / self.spread())
+        (self.distance_at - self.at * (self.distance / self.count)) / self.spread()
     }
 
     /// The variances of the positions to the east and north, and their covariance.
     fn variances(&self) -> (f64, f64, f64) {
-        let mean = self.at.times(1.0 / self.count);
+        let mean = self.at / self.count;
         let variance = |squares: f64, mean: f64| squares / self.count - mean * mean;
         let covariance = self.east_north / self.count - mean.east * mean.north;
         (variance(self.at_at.east, mean.east), variance(self.at_at.north, mean.north), covariance)
@@ -316,7 +290,7 @@ impl Fitted {
     /// The standard deviation of its direction in radians: by the error of the fixes, and by the bend in which they are.
     fn heading_error(&self) -> f64 {
         let slope = self.slope();
-        let forward = slope.times(1.0 / slope.length());
+        let forward = slope / slope.length();
         let (east, north, covariance) = self.variances();
         // The variance beside the line.
         let beside = east * forward.north.powi(2) + north * forward.east.powi(2)
@@ -341,15 +315,8 @@ mod tests {
         let plane = Plane::around(FIELD);
         let fix = |(second, distance_m): (usize, f64)| {
             let (time_ms, utc_ms) = (1000.0 * second as f64, 1000 * second as i64);
-            let fix = Fix {
-                time_ms,
-                utc_ms,
-                place: plane.place(at(distance_m)),
-                quality: Quality::Rtk,
-                error_m: 0.015,
-                track: 0,
-            };
-            (distance_m, fix)
+            let place = plane.place(at(distance_m));
+            (distance_m, Fix { time_ms, utc_ms, place, quality: Quality::Rtk, error_m: 0.015, track: 0 })
         };
         distances_m.into_iter().enumerate().map(fix).collect()
     }
@@ -359,7 +326,7 @@ mod tests {
     }
 
     fn track(fixes: &[(f64, Fix)]) -> Track {
-        Track::through(fixes, 20.0).expect("there are fixes")
+        Track::through(fixes, 20.0)
     }
 
     fn every_half_metre(count: u32) -> impl Iterator<Item = f64> {
@@ -368,7 +335,7 @@ mod tests {
 
     #[track_caller]
     fn off_m(found: Result<Found, Missing>, metres: Metres) -> f64 {
-        Plane::around(FIELD).metres(found.expect("it has a place").place).minus(metres).length()
+        (Plane::around(FIELD).metres(found.expect("it has a place").place) - metres).length()
     }
 
     #[test]
@@ -386,13 +353,13 @@ mod tests {
     proptest! {
         #[test]
         fn on_a_straight_row_positions_are_right_for_every_direction_and_offset(
-            direction in 0.0..std::f64::consts::TAU, distance_m in 0.1..29.4_f64, ahead_m in -3.0..3.0_f64, right_m in -3.0..3.0_f64,
+            direction in 0.0..360.0_f64, distance_m in 0.1..29.4_f64, ahead_m in -3.0..3.0_f64, right_m in -3.0..3.0_f64,
         ) {
-            let forward = Metres { east: direction.sin(), north: direction.cos() };
-            let fixes = driven(every_half_metre(60), |distance_m| forward.times(distance_m));
+            let forward = Metres::toward(direction);
+            let fixes = driven(every_half_metre(60), |distance_m| forward * distance_m);
             let track = track(&fixes);
             let found = track.find(distance_m, 2000.0 * distance_m, Offset { ahead_m, right_m });
-            let expected = forward.times(distance_m + ahead_m).plus(forward.turned_right().times(right_m));
+            let expected = forward * (distance_m + ahead_m) + forward.turned_right() * right_m;
             prop_assert!(off_m(found, expected) < 1e-4);
             prop_assert_eq!(found.expect("it has a place").utc_ms, (2000.0 * distance_m).round() as i64);
         }
@@ -404,7 +371,7 @@ mod tests {
             let fixes = driven(every_half_metre(60), eastward);
             let kept: Vec<_> =
                 fixes.iter().enumerate().filter(|(at, _)| !(lost..lost + length).contains(&(*at as u32))).map(|(_, it)| *it).collect();
-            let track = Track::through(&kept, 10.0).expect("there are fixes");
+            let track = Track::through(&kept, 10.0);
             let found = track.find(distance_m, 2000.0 * distance_m, Offset::default());
             let end_m = 0.5 * f64::from(lost + length);
             let has_no_end = end_m > 29.5;
@@ -432,7 +399,7 @@ mod tests {
         assert_eq!(track.find(-0.1, 5000.0, Offset::default()), Err(Missing::NoFixBefore));
         assert_eq!(track.find(4.6, 9000.0, Offset::default()), Err(Missing::NoFixBehind));
         assert_eq!(track.find(1.0, -1500.0, Offset::default()), Err(Missing::NoFixBefore));
-        assert!(Track::through(&[], 20.0).is_none());
+        assert_eq!(Track::through(&[], 20.0).find(0.0, 0.0, Offset::default()), Err(Missing::NoFixBefore));
     }
 
     #[test]
@@ -470,7 +437,7 @@ mod tests {
             let Ok(Found { error_m, .. }) = found else { continue };
             let turned = f64::max(0.0, (distance_m - 10.0) / 1.5);
             let forward = Metres { east: turned.cos(), north: turned.sin() };
-            let off_m = off_m(found, at(distance_m).plus(forward));
+            let off_m = off_m(found, at(distance_m) + forward);
             assert!(off_m <= 2.0 * error_m, "at {distance_m}: {off_m} m off, and {error_m}");
         }
     }
@@ -492,7 +459,7 @@ mod tests {
             fixes[at].1.place = plane.place(Metres { east: 0.0, north });
         }
         fixes.iter_mut().for_each(|(_, fix)| fix.error_m = 0.5);
-        let track = Track::through(&fixes, 20.0).expect("there are fixes");
+        let track = track(&fixes);
         assert!(off_m(track.find(0.0, 4000.0, Offset::default()), Metres { east: 0.0, north: 0.2 }) < 1e-4);
         let beside = Offset { ahead_m: 1.0, right_m: 0.0 };
         assert_eq!(track.find(0.25, 4000.0, beside), Err(Missing::NoHeading));

@@ -67,15 +67,15 @@ pub(crate) fn ratios(stations: &[Station], spins: &[Range<usize>]) -> Vec<Ratio>
         let mut line = Fitted::default();
         let mut end = begin;
         let is_spinning = |at: usize| at > begin && spins.iter().any(|spin| spin.start < at && at <= spin.end);
-        while let Some(station) = stations.get(end).filter(|it| it.track == first.track && !is_spinning(end)) {
+        while let Some(station) = stations.get(end).filter(|it| it.fix.track == first.fix.track && !is_spinning(end)) {
             line.add(station);
-            if line.misfit_m() > allowed_m(line.error_m()) {
+            if line.misfit_m() > allowed_m(line.error_m) {
                 break;
             }
             end += 1;
         }
         // A single station is a line, so the end is behind the beginning.
-        let is_bent = line.count() > (end - begin) as f64;
+        let is_bent = line.count > (end - begin) as f64;
         ratios.extend(ratio(&stations[begin..end], is_bent));
         begin = end;
     }
@@ -91,7 +91,7 @@ fn allowed_m(error_m: f64) -> f64 {
 fn ratio(stations: &[Station], is_bent: bool) -> Option<Ratio> {
     let length_m = |to: &Station| (to.distance_m - stations[0].distance_m).abs();
     let all_m = length_m(stations.last()?);
-    let error_m = stations.iter().map(|station| station.error_m).fold(0.0, f64::max);
+    let error_m = stations.iter().map(|station| station.fix.error_m).fold(0.0, f64::max);
     // A line of this length that turns back over this end of it has the greatest misfit that counts as straight.
     let bend_m = if is_bent { (4.0 * allowed_m(error_m).powi(2) * all_m).cbrt() } else { 0.0 };
     let mut line = Fitted::default();
@@ -106,7 +106,7 @@ pub(crate) fn spins(stations: &[Station]) -> Vec<Range<usize>> {
     let mut spins: Vec<Range<usize>> = Vec::new();
     let mut last = 0;
     for (first, from) in stations.iter().enumerate() {
-        let window_m = SPIN_M.max(SPIN_DEVIATIONS * from.error_m);
+        let window_m = SPIN_M.max(SPIN_DEVIATIONS * from.fix.error_m);
         let rolled_m = |at: usize| (stations[at].distance_m - from.distance_m).abs();
         last = last.max(first);
         while last < stations.len() && rolled_m(last) < window_m {
@@ -117,12 +117,9 @@ pub(crate) fn spins(stations: &[Station]) -> Vec<Range<usize>> {
         }
         // A long window over an outage, and a jump, say nothing.
         let window = &stations[first..=last];
-        let stays =
-            window.iter().all(|at| at.at.minus(from.at).length() < SPIN_SHARE * window_m && at.track == from.track);
-        if !stays {
-            continue;
-        }
+        let stays = |at: &Station| (at.at - from.at).length() < SPIN_SHARE * window_m && at.fix.track == from.fix.track;
         match spins.last_mut() {
+            _ if !window.iter().all(stays) => {}
             Some(spin) if first <= spin.end => spin.end = last,
             _ => spins.push(first..last),
         }

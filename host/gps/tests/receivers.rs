@@ -67,10 +67,9 @@ fn marks(log: &[Entry]) -> Vec<&str> {
 /// The greatest distance of an event from the machine's true line, and of the events' errors, in metres.
 fn off_m(job: &Job) -> (f64, f64) {
     let plane = Plane::around(Place { latitude: 51.5, longitude: 0.1 });
-    let (east, north) = 73_f64.to_radians().sin_cos();
     let found = job.events().filter_map(|event| Some((event.distance_m, event.found.ok()?)));
     found.fold((0.0, 0.0), |(off_m, error_m), (distance_m, found)| {
-        let at = plane.metres(found.place).minus(Metres { east, north }.times(distance_m));
+        let at = plane.metres(found.place) - Metres::toward(73.0) * distance_m;
         (at.length().max(off_m), found.error_m.max(error_m))
     })
 }
@@ -142,9 +141,8 @@ fn a_file_without_positions_is_refused_with_what_would_be_right() {
 /// RMC and GGA of 60 fixes, as the cases have them. `change` gets their number and both texts, without frame.
 fn sent(change: impl Fn(i64, [String; 2]) -> Vec<u8>) -> Vec<u8> {
     let plane = Plane::around(Place { latitude: 51.5, longitude: 0.1 });
-    let (east, north) = 73_f64.to_radians().sin_cos();
     let fix = |number: i64| {
-        let place = plane.place(Metres { east, north }.times(0.2 * SPEED / 1000.0 * number as f64));
+        let place = plane.place(Metres::toward(73.0) * (0.2 * SPEED / 1000.0 * number as f64));
         let fix = Some((place, Quality::Rtk));
         let utc_ms = 1_781_432_100_000 + 200 * number;
         change(number, [gps::simulated::rmc(utc_ms, fix), gps::simulated::gga(utc_ms, fix)])
@@ -231,25 +229,20 @@ proptest! {
     fn a_clock_that_steps_back_puts_no_plant_off(at in 15..40_i64, by_s in 1..18_i64, is_lost in any::<bool>()) {
         let utc_ms = |number: i64| 1_781_432_100_000 + 200 * number - if number >= at { 1000 * by_s } else { 0 };
         let plane = Plane::around(Place { latitude: 51.5, longitude: 0.1 });
-        let (east, north) = 73_f64.to_radians().sin_cos();
         let mut receiver = gps::receiver::Receiver::new(None);
-        let (mut fixes, mut steps) = (Vec::new(), 0);
-        let mut keep = |heard: gps::receiver::Heard| {
-            fixes.extend(heard.fixes);
-            steps += heard.marks.iter().filter(|mark| matches!(mark, Mark::Stepped(_))).count();
-        };
         for number in 0..60 {
             // Lines come up to 90 ms late, and none around the step if it is lost.
             let time_ms = 200.0 * number as f64 + 30.0 * (number % 4) as f64;
             receiver.rolled(time_ms, SPEED / 1000.0 * time_ms / 1000.0, SPEED);
-            let place = plane.place(Metres { east, north }.times(0.2 * SPEED / 1000.0 * number as f64));
+            let place = plane.place(Metres::toward(73.0) * (0.2 * SPEED / 1000.0 * number as f64));
             if !is_lost || !(at - 6..at + 2).contains(&number) {
-                keep(receiver.take(time_ms, &framed(&gps::simulated::gga(utc_ms(number), Some((place, Quality::Rtk))))));
+                receiver.take(time_ms, &framed(&gps::simulated::gga(utc_ms(number), Some((place, Quality::Rtk)))));
             }
         }
-        keep(receiver.end());
-        prop_assert_eq!((fixes.len(), steps), (if is_lost { 52 } else { 60 }, 1));
-        for fix in fixes {
+        receiver.end();
+        let steps = receiver.marks.iter().filter(|mark| matches!(mark, Mark::Stepped(_))).count();
+        prop_assert_eq!((receiver.fixes.len(), steps), (if is_lost { 52 } else { 60 }, 1));
+        for fix in receiver.fixes {
             let metres = plane.metres(fix.place).length();
             prop_assert!((fix.time_ms - 1000.0 * metres / (SPEED / 1000.0)).abs() < 100.0, "{:?}", fix);
         }

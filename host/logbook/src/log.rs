@@ -198,7 +198,7 @@ pub fn parse(path: &Path, text: Vec<u8>) -> Result<Vec<Entry>, FileError> {
                 line.error(format!("kind is `{}`: it has to be one of {known}", line.text("kind")))
             })?;
             let time_ms = line.value("time_ms", "a whole number of milliseconds")?;
-            Ok(Entry { number: line.number(), time_ms, kind, text: line.text("line").to_owned() })
+            Ok(Entry { number: line.number, time_ms, kind, text: line.text("line").to_owned() })
         })
         .collect()
 }

@@ -2,8 +2,7 @@
 
 use link::LinkError;
 use link::moment::Moment;
-use link::session::{Happening, Session, Turn, Unanswered};
-use link::settings::helps;
+use link::session::{Happening, Session, Turn};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use std::cell::RefCell;
@@ -85,39 +84,8 @@ fn moment(ms: f64) -> Moment {
 /// A turn in the form of `Turn` in `page/src/link/session.ts`.
 fn answer(session: &mut Session, turn: Turn) -> Value {
     let send: String = turn.to_send.into_iter().map(char::from).collect();
-    let news: Vec<Value> = turn.happened.into_iter().map(news).collect();
+    let news: Vec<Value> = turn.happened.iter().map(Happening::news).collect();
     json!({ "news": news, "send": send, "failure": session.take_failure().map(|error| failure(&error)) })
-}
-
-/// A happening in the form of `News` in `page/src/link/session.ts`.
-fn news(happening: Happening) -> Value {
-    match happening {
-        Happening::Started { greeting, while_at_work } => {
-            json!({ "is": "restarted", "said": greeting, "wasAtWork": while_at_work.is_some() })
-        }
-        Happening::Connected { version, shown, examples, .. } => {
-            json!({ "is": "there", "version": version, "settings": shown, "examples": examples, "help": helps() })
-        }
-        Happening::Lost(why) => json!({ "is": "lost", "why": why }),
-        Happening::Status(_, line) => json!({ "is": "status", "said": line }),
-        Happening::Event(_, line) => json!({ "is": "event", "said": line }),
-        Happening::Settings(_, lines) => json!({ "is": "settings", "said": lines }),
-        Happening::Examples(lines) => json!({ "is": "examples", "said": lines }),
-        Happening::Command(line) => json!({ "is": "command", "line": line }),
-        Happening::Answer(line) => json!({ "is": "answer", "line": line }),
-        Happening::Answered { number, refusal, .. } => {
-            json!({ "is": "answered", "number": number, "refusal": refusal })
-        }
-        Happening::Unanswered { number, why, .. } => {
-            let (why, because) = match why {
-                Unanswered::Late => ("late", None),
-                Unanswered::Held => ("held", None),
-                Unanswered::NotTyped(because) => ("notTyped", Some(because)),
-                Unanswered::Unknown(because) => ("unknown", Some(because)),
-            };
-            json!({ "is": "unanswered", "number": number, "why": why, "because": because })
-        }
-    }
 }
 
 /// Why no weeder answers, in the form of `Failure` in `page/src/link/session.ts`.

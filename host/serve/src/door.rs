@@ -117,38 +117,34 @@ mod tests {
         request.body(()).unwrap()
     }
 
-    /// The hosts and origins of a request, and whether it comes in by GET and by POST.
-    type Case = (&'static [&'static str], &'static [&'static str], [Result<(), Denial>; 2]);
-
     #[test]
     fn a_paired_client_comes_in_if_it_names_the_address_and_no_other_origin() {
         let (foreign_host, foreign_origin) = (Err(Denial::ForeignHost), Err(Denial::ForeignOrigin));
-        let cases: &[Case] = &[
-            (&[ADDRESS], &[OWN], [Ok(()); 2]),
-            (&[ADDRESS], &[], [Ok(()), foreign_origin]),
-            (&[], &[], [foreign_host; 2]),
-            (&[""], &[OWN], [foreign_host; 2]),
-            (&["weeder.example:8866"], &[], [foreign_host; 2]),
-            (&["weeder.example:8866"], &[OWN], [foreign_host; 2]),
-            (&["192.168.1.5"], &[OWN], [foreign_host; 2]),
-            (&["192.168.1.5:8867"], &[OWN], [foreign_host; 2]),
-            (&["192.168.1.50:8866"], &[OWN], [foreign_host; 2]),
-            (&["localhost:8866"], &[OWN], [foreign_host; 2]),
-            (&[ADDRESS, ADDRESS], &[OWN], [foreign_host; 2]),
-            (&[ADDRESS, "weeder.example"], &[OWN], [foreign_host; 2]),
-            (&[ADDRESS], &["null"], [foreign_origin; 2]),
-            (&[ADDRESS], &["http://weeder.example:8866"], [foreign_origin; 2]),
-            (&[ADDRESS], &["https://192.168.1.5:8866"], [foreign_origin; 2]),
-            (&[ADDRESS], &["http://192.168.1.5"], [foreign_origin; 2]),
-            (&[ADDRESS], &["http://192.168.1.5:8866.example"], [foreign_origin; 2]),
-            (&[ADDRESS], &[OWN, OWN], [foreign_origin; 2]),
-            (&[ADDRESS], &[""], [foreign_origin; 2]),
-        ];
-        for (hosts, origins, admitted) in cases {
+        let check = |hosts: &[&str], origins: &[&str], admitted: [Result<(), Denial>; 2]| {
             for path in ["/", "/pair", "/pair.js", "/page.js", "/machines", "/events"] {
                 let requests = METHODS.map(|method| request(method, path, hosts, origins));
-                assert_eq!(requests.each_ref().map(|request| lan().admit(request, true)), *admitted, "{requests:?}");
+                assert_eq!(requests.each_ref().map(|request| lan().admit(request, true)), admitted, "{requests:?}");
             }
+        };
+        check(&[ADDRESS], &[OWN], [Ok(()); 2]);
+        check(&[ADDRESS], &[], [Ok(()), foreign_origin]);
+        for host in
+            ["", "weeder.example:8866", "192.168.1.5", "192.168.1.5:8867", "192.168.1.50:8866", "localhost:8866"]
+        {
+            check(&[host], &[OWN], [foreign_host; 2]);
+            check(&[host], &[], [foreign_host; 2]);
+        }
+        for hosts in [&[][..], &[ADDRESS, ADDRESS], &[ADDRESS, "weeder.example"]] {
+            check(hosts, &[OWN], [foreign_host; 2]);
+            check(hosts, &[], [foreign_host; 2]);
+        }
+        for origin in
+            ["", "null", "http://weeder.example:8866", "http://192.168.1.5", "http://192.168.1.5:8866.example"]
+        {
+            check(&[ADDRESS], &[origin], [foreign_origin; 2]);
+        }
+        for origins in [&["https://192.168.1.5:8866"][..], &[OWN, OWN]] {
+            check(&[ADDRESS], origins, [foreign_origin; 2]);
         }
         let for_proxy = request(Method::GET, "http://192.168.1.5:8866/events", &[ADDRESS], &[]);
         assert_eq!(lan().admit(&for_proxy, true), foreign_host);

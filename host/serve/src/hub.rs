@@ -3,9 +3,9 @@
 //! Machines write and pages read. No page makes a machine wait: a page that is too slow misses messages, and gets a notice.
 //! The memory does not grow with the number of pages.
 
-use super::knowledge::{Knowledge, Stale};
+use super::knowledge::Knowledge;
 use link::moment::Moment;
-use link::settings::helps;
+use link::session::Unanswered;
 use parking_lot::Mutex;
 use serde_json::{Value, json};
 use std::sync::Arc;
@@ -34,23 +34,24 @@ pub struct Hub {
 }
 
 struct State {
-    /// The greeting after each machine's last restart at work, until it works again.
-    restarted: Vec<Option<String>>,
     /// Each machine's state, as the first message to a new page.
     machines: Vec<Value>,
+    /// The message about each machine's last restart at work, until it works again.
+    restarted: Vec<Option<Value>>,
     knowledge: Knowledge,
 }
 
 impl Hub {
     /// This number of machines, before the message with the number `first`.
     pub fn new(machines: usize, first: u64, clock: Clock) -> Self {
-        let knowledge = Knowledge::new(first, machines);
-        let lost = (0..machines).map(|machine| lost(machine, "its port is being opened")).collect();
-        Self {
-            clock,
-            state: Mutex::new(State { restarted: vec![None; machines], machines: lost, knowledge }),
-            pages: broadcast::channel(BEHIND * machines.max(2)).0,
-        }
+        let state = State {
+            machines: (0..machines)
+                .map(|machine| json!({ "machine": machine, "is": "lost", "why": "its port is being opened" }))
+                .collect(),
+            restarted: vec![None; machines],
+            knowledge: Knowledge::new(first, machines),
+        };
+        Self { clock, state: Mutex::new(state), pages: broadcast::channel(BEHIND * machines.max(2)).0 }
     }
 
     /// The present moment.
@@ -58,67 +59,39 @@ impl Hub {
         (self.clock)()
     }
 
-    /// The machine is connected: the firmware's version, and the lines that show its settings and examples.
-    pub fn there(&self, machine: usize, version: &str, settings: &[String], examples: &[String]) {
-        self.change(
-            machine,
-            json!({
-                "machine": machine,
-                "is": "there",
-                "version": version,
-                "settings": settings,
-                "examples": examples,
-                "help": helps(),
-            }),
-        );
-    }
-
-    pub fn lost(&self, machine: usize, why: &str) {
-        self.change(machine, lost(machine, why));
-    }
-
-    /// The machine has sent its status as a line, or has new settings or examples, as lines.
-    pub fn know(&self, machine: usize, what: &str, said: Value) {
+    /// Sends what has happened at a machine, as [`Happening::news`](link::session::Happening::news) has it. A page that
+    /// connects later gets the state that follows.
+    pub fn news(&self, machine: usize, mut news: Value) {
+        news["machine"] = machine.into();
         let mut state = self.state.lock();
-        self.send(&mut state, &json!({ "machine": machine, "is": what, "said": said }));
-        if let Some(known) = state.machines.get_mut(machine).filter(|known| known["is"] == "there") {
-            known[what] = said;
+        self.send(&mut state, &news);
+        match news["is"].as_str().unwrap_or_default() {
+            "there" | "lost" => state.machines[machine] = news,
+            "restarted" => state.restarted[machine] = Some(news),
+            what @ ("status" | "settings" | "examples") if state.machines[machine]["is"] == "there" => {
+                state.machines[machine][what] = news["said"].clone();
+            }
+            _ => {}
         }
-    }
-
-    /// The machine has sent an event line.
-    pub fn event(&self, machine: usize, line: &str) {
-        self.send(&mut self.state.lock(), &json!({ "machine": machine, "is": "event", "said": line }));
-    }
-
-    /// The machine has restarted at work, with this greeting. Every page shows this until it works again.
-    pub fn restarted(&self, machine: usize, greeting: &str) {
-        let mut state = self.state.lock();
-        if let Some(restarted) = state.restarted.get_mut(machine) {
-            *restarted = Some(greeting.to_owned());
-        }
-        self.send(&mut state, &json!({ "machine": machine, "is": "restarted", "said": greeting }));
     }
 
     /// The machine works.
     pub fn works(&self, machine: usize) {
-        if let Some(restarted) = self.state.lock().restarted.get_mut(machine) {
-            *restarted = None;
-        }
+        self.state.lock().restarted[machine] = None;
     }
 
     /// The machine is to hold, or holds: commands of senders that do not know this yet are refused.
     pub fn hold(&self, machine: usize) {
         let mut state = self.state.lock();
-        let number = state.knowledge.hold(machine, self.now());
-        self.publish(number, &json!({ "machine": machine, "is": "held" }));
+        let number = self.send(&mut state, &json!({ "machine": machine, "is": "held" }));
+        state.knowledge.hold(machine, number);
     }
 
     /// Until when a command to a machine may be typed, if its sender has seen the message of this number.
     ///
     /// # Errors
     /// If a HOLD has come since, or the message is too old.
-    pub fn deadline(&self, machine: usize, seen: u64) -> Result<Moment, Stale> {
+    pub fn deadline(&self, machine: usize, seen: u64) -> Result<Moment, Unanswered> {
         self.state.lock().knowledge.deadline(machine, seen, self.now())
     }
 
@@ -129,10 +102,7 @@ impl Hub {
 
     /// Why a machine is lost; `None` if it is connected.
     pub fn why_lost(&self, machine: usize) -> Option<String> {
-        match self.state.lock().machines.get(machine) {
-            Some(known) => known["why"].as_str().map(str::to_owned),
-            None => Some("there is no such machine".to_owned()),
-        }
+        self.state.lock().machines[machine]["why"].as_str().map(str::to_owned)
     }
 
     /// The present state of all machines, and the receiver of later messages.
@@ -140,59 +110,44 @@ impl Hub {
         let mut state = self.state.lock();
         let State { machines, knowledge, restarted } = &mut *state;
         let now = self.now();
-        let mut message = |known: &Value| Message { number: knowledge.number(now), text: known.to_string().into() };
-        let mut messages: Vec<Message> = machines.iter().map(&mut message).collect();
-        for (machine, greeting) in restarted.iter().enumerate() {
-            if let Some(greeting) = greeting {
-                messages.push(message(&json!({ "machine": machine, "is": "restarted", "said": greeting })));
-            }
-        }
+        let known = machines.iter().chain(restarted.iter().flatten());
+        let message = |known: &Value| Message { number: knowledge.number(now), text: known.to_string().into() };
+        let messages = known.map(message).collect();
         (messages, self.pages.subscribe())
     }
 
-    fn change(&self, machine: usize, message: Value) {
-        let mut state = self.state.lock();
-        self.send(&mut state, &message);
-        if let Some(known) = state.machines.get_mut(machine) {
-            *known = message;
-        }
-    }
-
     /// Sends while the lock is held, so that a page does not get a change twice: its first state may already include it.
-    fn send(&self, state: &mut State, message: &Value) {
-        self.publish(state.knowledge.number(self.now()), message);
-    }
-
-    fn publish(&self, number: u64, message: &Value) {
+    /// Returns the message's number.
+    fn send(&self, state: &mut State, message: &Value) -> u64 {
+        let number = state.knowledge.number(self.now());
         // An error means that no page listens.
         let _ = self.pages.send(Message { number, text: message.to_string().into() });
+        number
     }
-}
-
-fn lost(machine: usize, why: &str) -> Value {
-    json!({ "machine": machine, "is": "lost", "why": why })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use link::session::Happening;
+    use link::settings::Settings;
 
-    fn heard(pages: &mut Receiver<Message>) -> Vec<Value> {
-        std::iter::from_fn(|| pages.try_recv().ok())
-            .map(|message| serde_json::from_str(&message.text).unwrap())
-            .collect()
+    fn read(message: &Message) -> Value {
+        serde_json::from_str(&message.text).unwrap()
     }
 
     #[test]
     fn a_new_page_gets_the_state_of_all_machines_and_then_the_changes() {
         let hub = Hub::new(2, 5000, Box::new(Moment::now));
-        hub.there(0, "0.2.0", &["k=5".to_owned()], &["field 0".to_owned()]);
-        hub.know(0, "status", "state=hold".into());
-        hub.know(0, "settings", json!(["k=3"]));
+        let (shown, examples) = (vec!["k=5".to_owned()], vec!["field 0".to_owned()]);
+        let there = Happening::Connected { version: "0.2.0".to_owned(), settings: Settings::new(), shown, examples };
+        hub.news(0, there.news());
+        hub.news(0, json!({ "is": "status", "said": "state=hold" }));
+        hub.news(0, json!({ "is": "settings", "said": ["k=3"] }));
         // A lost machine has no status.
-        hub.know(1, "status", "state=work".into());
+        hub.news(1, json!({ "is": "status", "said": "state=work" }));
         let (now, mut later) = hub.listen();
-        let mut now: Vec<Value> = now.iter().map(|message| serde_json::from_str(&message.text).unwrap()).collect();
+        let mut now: Vec<Value> = now.iter().map(read).collect();
         let help = now[0].as_object_mut().unwrap().remove("help").unwrap();
         assert_eq!(help["wheel_mm"], "wheel diameter");
         let expected = [
@@ -207,14 +162,15 @@ mod tests {
             json!({ "machine": 1, "is": "lost", "why": "its port is being opened" }),
         ];
         assert_eq!(now, expected);
-        assert_eq!((hub.why_lost(0), hub.why_lost(2).is_some()), (None, true));
-        hub.event(0, "state=work");
-        hub.lost(0, "pulled");
+        assert_eq!(hub.why_lost(0), None);
+        hub.news(0, json!({ "is": "event", "said": "state=work" }));
+        hub.news(0, json!({ "is": "lost", "why": "pulled" }));
         let expected = [
             json!({ "machine": 0, "is": "event", "said": "state=work" }),
             json!({ "machine": 0, "is": "lost", "why": "pulled" }),
         ];
-        assert_eq!(heard(&mut later), expected);
+        let heard: Vec<Value> = std::iter::from_fn(|| later.try_recv().ok()).map(|message| read(&message)).collect();
+        assert_eq!(heard, expected);
         assert_eq!(hub.why_lost(0).as_deref(), Some("pulled"));
     }
 }

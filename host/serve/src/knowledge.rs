@@ -6,21 +6,12 @@
 //! not executed. HOLD itself is never refused.
 
 use link::moment::Moment;
+use link::session::Unanswered;
 use std::collections::VecDeque;
 use std::time::Duration;
-use thiserror::Error;
 
 /// Greatest age of the message that a sender has seen last.
 pub const FRESH: Duration = Duration::from_secs(1);
-
-/// Why a command is not executed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-pub enum Stale {
-    #[error("hold came first, so this was not sent")]
-    Held,
-    #[error("this came more than a second late, so it was not sent: look at the machine, then try again")]
-    Late,
-}
 
 /// The numbers of the messages.
 #[derive(Clone, Debug)]
@@ -50,25 +41,21 @@ impl Knowledge {
         number
     }
 
-    /// Numbers the message about a machine's HOLD.
-    pub fn hold(&mut self, machine: usize, now: Moment) -> u64 {
-        let number = self.number(now);
-        if let Some(held) = self.held.get_mut(machine) {
-            *held = number;
-        }
-        number
+    /// The message with this number is about a machine's HOLD.
+    pub fn hold(&mut self, machine: usize, number: u64) {
+        self.held[machine] = number;
     }
 
     /// Until when a command to a machine may be typed, if its sender has seen this message.
     ///
     /// # Errors
     /// If a HOLD has come since, or the message is too old.
-    pub fn deadline(&self, machine: usize, seen: u64, now: Moment) -> Result<Moment, Stale> {
+    pub fn deadline(&self, machine: usize, seen: u64, now: Moment) -> Result<Moment, Unanswered> {
         let made = self.recent.iter().find(|&&(number, _)| number == seen).map(|&(_, at)| at);
         match made {
-            Some(_) if self.held.get(machine).is_none_or(|&held| seen < held) => Err(Stale::Held),
+            Some(_) if seen < self.held[machine] => Err(Unanswered::Held),
             Some(at) if now.since(at) <= FRESH => Ok(at.after(FRESH)),
-            _ => Err(Stale::Late),
+            _ => Err(Unanswered::Late),
         }
     }
 }
@@ -86,25 +73,25 @@ mod tests {
         let mut knowledge = Knowledge::new(5000, 1);
         let seen = knowledge.number(at(100));
         assert_eq!(knowledge.deadline(0, seen, at(1100)), Ok(at(1100)));
-        assert_eq!(knowledge.deadline(0, seen, at(1101)), Err(Stale::Late));
+        assert_eq!(knowledge.deadline(0, seen, at(1101)), Err(Unanswered::Late));
         // Of the future, or of an earlier start.
         for unknown in [seen + 1, seen - 1, 0] {
-            assert_eq!(knowledge.deadline(0, unknown, at(100)), Err(Stale::Late));
+            assert_eq!(knowledge.deadline(0, unknown, at(100)), Err(Unanswered::Late));
         }
         // The computer has slept for a minute, and only the calendar has gone on.
         let woken = Moment { ticking: at(100).ticking, calendar: at(60_100).calendar };
-        assert_eq!(knowledge.deadline(0, seen, woken), Err(Stale::Late));
+        assert_eq!(knowledge.deadline(0, seen, woken), Err(Unanswered::Late));
     }
 
     #[test]
     fn a_command_from_before_a_hold_is_refused_and_one_from_after_it_is_not() {
         let mut knowledge = Knowledge::new(5000, 2);
         let before = knowledge.number(at(0));
-        let held = knowledge.hold(1, at(10));
-        assert_eq!(knowledge.deadline(1, before, at(20)), Err(Stale::Held));
+        let held = knowledge.number(at(10));
+        knowledge.hold(1, held);
+        assert_eq!(knowledge.deadline(1, before, at(20)), Err(Unanswered::Held));
         assert!(knowledge.deadline(0, before, at(20)).is_ok());
         assert!(knowledge.deadline(1, held, at(20)).is_ok());
-        assert_eq!(knowledge.deadline(2, held, at(20)), Err(Stale::Held));
     }
 
     #[test]

@@ -23,7 +23,7 @@ use self::door::Door;
 use self::hub::Hub;
 use self::machine::Machine;
 use self::page::Page;
-use self::pairing::{CODE_LENGTH, Code, Pairing};
+use self::pairing::{Code, Pairing};
 use self::places::Places;
 use self::routes::{Served, Visitor, routes};
 use axum::Extension;
@@ -129,19 +129,15 @@ impl Server {
     pub fn open(setup: Setup) -> Result<Self, ServeError> {
         let runtime = runtime::Builder::new_current_thread().enable_io().enable_time().build();
         let runtime = runtime.map_err(|error| ServeError::System("way to wait for sockets", error))?;
-        let mut random = [0; CODE_LENGTH];
-        getrandom::fill(&mut random).map_err(|error| ServeError::System("randomness", error.into()))?;
-        let code = Code::new(random);
+        let code = Code::new(random()?);
 
         let doors = {
             let _inside = runtime.enter();
             listen(setup.lan, setup.port, setup.may_start)?
         };
         // A page keeps these numbers as text, so they may have any size.
-        let mut first = [0; 4];
-        getrandom::fill(&mut first).map_err(|error| ServeError::System("randomness", error.into()))?;
-        let hub =
-            Arc::new(Hub::new(setup.machines.len(), u64::from(u32::from_ne_bytes(first)) << 20, Box::new(Moment::now)));
+        let first = u64::from(u32::from_ne_bytes(random()?)) << 20;
+        let hub = Arc::new(Hub::new(setup.machines.len(), first, Box::new(Moment::now)));
         let start =
             |(number, (name, open))| Machine::start(number, name, open, Arc::clone(&hub), Arc::clone(&setup.tell));
         let machines = setup.machines.into_iter().enumerate().map(start).collect();
@@ -173,6 +169,13 @@ impl Server {
         // Open connections are closed without waiting for their clients.
         self.runtime.shutdown_background();
     }
+}
+
+/// Bytes from the system's random source.
+fn random<const LENGTH: usize>() -> Result<[u8; LENGTH], ServeError> {
+    let mut bytes = [0; LENGTH];
+    getrandom::fill(&mut bytes).map_err(|error| ServeError::System("randomness", error.into()))?;
+    Ok(bytes)
 }
 
 /// This computer's address in its network, where it is in one.
@@ -249,22 +252,20 @@ async fn attend(listener: TcpListener, door: Arc<Door>, places: Places, routes: 
             sleep(LOOK).await;
             continue;
         };
-        let (place, mut end) = places.take(peer.ip());
-        let place = Arc::new(place);
+        let place = Arc::new(places.take(peer.ip()));
         let visitor = Visitor { address: peer.ip(), door: Arc::clone(&door), place: Arc::clone(&place), known: None };
         let routes = routes.clone().layer(Extension(visitor));
         tokio::spawn(async move {
             let mut served = pin!(serve(stream, routes));
             // Closes the connection at its end, or when it loses its place. Before that, what has come is read.
-            while matches!(select(&mut served, end).await, Either::Right(_)) {
+            while matches!(select(&mut served, pin!(place.lost())).await, Either::Right(_)) {
                 for _ in 0..TURNS_TO_READ {
                     if matches!(select(&mut served, pin!(yield_now())).await, Either::Left(_)) {
                         return;
                     }
                 }
-                match place.next_end() {
-                    Some(next) => end = next,
-                    None => return,
+                if place.is_over() {
+                    return;
                 }
             }
         });
@@ -293,17 +294,12 @@ async fn serve(stream: TcpStream, routes: Router) {
 mod tests {
     use super::*;
 
-    fn found(addresses: &[[u8; 4]]) -> Result<Ipv4Addr, String> {
-        only_lan(addresses.iter().map(|&address| address.into())).map_err(|error| error.to_string())
-    }
-
     #[test]
-    fn the_only_address_in_a_network_is_found_among_others() {
+    fn the_only_address_in_a_network_is_found_and_several_or_none_are_errors_with_a_remedy() {
+        let found = |addresses: &[[u8; 4]]| {
+            only_lan(addresses.iter().map(|&address| address.into())).map_err(|error| error.to_string())
+        };
         assert_eq!(found(&[[127, 0, 0, 1], [192, 168, 4, 1], [8, 8, 8, 8]]), Ok([192, 168, 4, 1].into()));
-    }
-
-    #[test]
-    fn several_networks_and_no_network_are_errors_with_a_remedy() {
         let error = found(&[[192, 168, 4, 1], [172, 17, 0, 1]]).unwrap_err();
         assert!(error.ends_with("as in `--lan 192.168.4.1`, of 192.168.4.1, 172.17.0.1"), "{error}");
         let error = found(&[[127, 0, 0, 1]]).unwrap_err();

@@ -1,4 +1,4 @@
-//! The page's three files, and the form for the code.
+//! The page's three files.
 
 use axum::body::Bytes;
 use std::fs;
@@ -38,11 +38,4 @@ impl Page {
     pub fn of(files: [&'static [u8]; 3]) -> Self {
         Self(files.map(Bytes::from_static))
     }
-}
-
-/// The form for the code.
-pub(crate) mod form {
-    pub const HTML: &str = include_str!("pair/pair.html");
-    pub const CSS: &str = include_str!("pair/pair.css");
-    pub const JS: &str = include_str!("pair/pair.js");
 }

@@ -13,10 +13,7 @@ use subtle::ConstantTimeEq;
 const ALPHABET: &[u8; 32] = b"0123456789ABCDEFGHJKMNPQRSTVWXYZ";
 
 /// Characters in a code.
-pub const CODE_LENGTH: usize = 8;
-
-/// Bytes in a token.
-pub const TOKEN_LENGTH: usize = 32;
+const CODE_LENGTH: usize = 8;
 
 /// Wrong codes after which codes are refused for some time.
 const TRIES: u32 = 5;
@@ -28,7 +25,7 @@ const LOCKED_FOR: Duration = Duration::from_secs(60);
 const PHONES: usize = 32;
 
 /// The secret that a paired browser presents.
-pub type Token = [u8; TOKEN_LENGTH];
+pub type Token = [u8; 32];
 
 /// A pairing code.
 #[derive(Clone)]
@@ -121,7 +118,7 @@ impl Pairing {
         if self.paired.len() == PHONES {
             self.paired.pop_front();
         }
-        self.paired.push_back((self.next, hexadecimal(&token)));
+        self.paired.push_back((self.next, hex::encode(token)));
         self.next += 1;
         self.paired.len()
     }
@@ -133,11 +130,6 @@ impl Pairing {
             if bool::from(token.as_bytes().ct_eq(shown.as_bytes())) { Some(*number) } else { found }
         })
     }
-}
-
-/// A token in the form of the cookie.
-pub fn hexadecimal(token: &Token) -> String {
-    token.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 #[cfg(test)]
@@ -198,7 +190,7 @@ mod tests {
     fn only_a_phone_with_a_token_is_paired() {
         let mut pairing = pairing();
         assert_eq!((pairing.phone(""), pairing.phone(&"0".repeat(64))), (None, None));
-        assert_eq!((pairing.pair([1; TOKEN_LENGTH]), pairing.pair([2; TOKEN_LENGTH])), (1, 2));
+        assert_eq!((pairing.pair([1; 32]), pairing.pair([2; 32])), (1, 2));
         assert_eq!((pairing.phone(&"01".repeat(32)), pairing.phone(&"02".repeat(32))), (Some(0), Some(1)));
         for wrong in ["", "01", &"01".repeat(31), &"01".repeat(33), &"03".repeat(32), &"10".repeat(32)] {
             assert_eq!(pairing.phone(wrong), None, "{wrong}");
@@ -209,9 +201,9 @@ mod tests {
     fn with_too_many_phones_the_first_has_to_pair_again() {
         let mut pairing = pairing();
         for number in 0..=PHONES {
-            pairing.pair([number as u8; TOKEN_LENGTH]);
+            pairing.pair([number as u8; 32]);
         }
-        let number = |token: usize| pairing.phone(&hexadecimal(&[token as u8; TOKEN_LENGTH]));
+        let number = |token: usize| pairing.phone(&hex::encode([token as u8; 32]));
         assert_eq!((number(0), number(1), number(PHONES)), (None, Some(1), Some(PHONES as u64)));
     }
 }

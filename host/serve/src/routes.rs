@@ -14,11 +14,12 @@
 
 use super::door::Door;
 use super::hub::{Hub, Message};
-use super::machine::{Machine, NoAnswer, Tell};
-use super::page::{Page, form};
-use super::pairing::{Pairing, TOKEN_LENGTH, Token, Try, hexadecimal};
+use super::machine::{Machine, Tell};
+use super::page::Page;
+use super::pairing::{Pairing, Try};
 use super::places::{Client, Place, Stage};
-use super::rules::{self, Forbidden, Order, Reach};
+use super::random;
+use super::rules::{self, Forbidden, Reach};
 use axum::Extension;
 use axum::Router;
 use axum::body::{Body, Bytes, to_bytes};
@@ -34,6 +35,7 @@ use axum::response::{Html, IntoResponse, Response};
 use axum::routing::{get, post};
 use futures_util::future::join_all;
 use futures_util::stream::{self, Stream, StreamExt};
+use link::session::Unanswered;
 use parking_lot::Mutex;
 use std::convert::Infallible;
 use std::error::Error;
@@ -100,8 +102,8 @@ pub fn routes(served: Arc<Served>) -> Router {
     for (path, media, content) in [
         ("/page.css", "text/css; charset=utf-8", css),
         ("/page.js", "text/javascript; charset=utf-8", js),
-        ("/pair.css", "text/css; charset=utf-8", form::CSS.into()),
-        ("/pair.js", "text/javascript; charset=utf-8", form::JS.into()),
+        ("/pair.css", "text/css; charset=utf-8", include_str!("pair/pair.css").into()),
+        ("/pair.js", "text/javascript; charset=utf-8", include_str!("pair/pair.js").into()),
     ] {
         routes = routes.route(path, get(move || async move { ([(CONTENT_TYPE, media)], content) }));
     }
@@ -165,7 +167,7 @@ fn cookies(headers: &HeaderMap) -> impl Iterator<Item = &str> {
 /// The page, or the form for the code.
 async fn front(State(served): State<Arc<Served>>, Extension(visitor): Extension<Visitor>, uri: Uri) -> Response {
     if visitor.known.is_none() {
-        return Html(form::HTML).into_response();
+        return Html(include_str!("pair/pair.html")).into_response();
     }
     // This tells the page that it is connected to a machine.
     match uri.query() {
@@ -187,13 +189,12 @@ async fn pair(
     let tried = served.pairing.lock().try_code(&typed, Instant::now());
     match tried {
         Try::Right => {
-            let mut token: Token = [0; TOKEN_LENGTH];
-            if getrandom::fill(&mut token).is_err() {
+            let Ok(token) = random() else {
                 return (StatusCode::INTERNAL_SERVER_ERROR, "the system has no randomness to give\n").into_response();
-            }
+            };
             let paired = served.pairing.lock().pair(token);
             (served.tell)(&format!("{address} is paired now. Paired in all: {paired}."));
-            let cookie = format!("{COOKIE_NAME}={}; HttpOnly; SameSite=Strict; Path=/", hexadecimal(&token));
+            let cookie = format!("{COOKIE_NAME}={}; HttpOnly; SameSite=Strict; Path=/", hex::encode(token));
             (StatusCode::NO_CONTENT, [(SET_COOKIE, cookie)]).into_response()
         }
         Try::Wrong { left: 0 } => {
@@ -241,47 +242,58 @@ async fn command(
         return refused(StatusCode::NOT_FOUND, "there is no such machine");
     };
     let Ok(line) = String::from_utf8(body.into()) else { return no_line() };
-    let order = match rules::allow(&line, visitor.door.reach) {
-        Ok(order) => order,
+    match rules::allow(&line, visitor.door.reach) {
+        Ok(()) => {}
         Err(Forbidden::NoLine) => return no_line(),
         Err(why) => return refused(StatusCode::FORBIDDEN, why),
+    }
+    let answer = if link::is_hold(&line) {
+        visitor.enter(Stage::Holding);
+        machine.hold().await
+    } else {
+        let seen = headers.get(SEEN).and_then(|seen| seen.to_str().ok()?.parse().ok());
+        let Some(seen) = seen else {
+            let right = "send the `id` of the last message of /events as the header Weeder-Seen, or send `hold`";
+            return refused(StatusCode::PRECONDITION_REQUIRED, right);
+        };
+        machine.command(line, seen).await
     };
-    let seen = headers.get(SEEN).and_then(|seen| seen.to_str().ok()?.parse().ok());
-    let seen = match (order, seen) {
-        (Order::Hold, _) => {
-            visitor.enter(Stage::Holding);
-            0
-        }
-        (Order::Type, Some(seen)) => seen,
-        (Order::Type, None) => return refused(StatusCode::PRECONDITION_REQUIRED, NO_KNOWLEDGE),
-    };
-    let answer = machine.take(&served.hub, order, line, seen).await;
     match answer {
         Ok(lines) => (lines.join("\n") + "\n").into_response(),
-        Err(why @ NoAnswer::Stale(_)) => refused(StatusCode::PRECONDITION_FAILED, why),
-        Err(why @ (NoAnswer::Lost(_) | NoAnswer::Busy)) => refused(StatusCode::SERVICE_UNAVAILABLE, why),
-        Err(why @ (NoAnswer::Unknown(_) | NoAnswer::Silent)) => refused(StatusCode::GATEWAY_TIMEOUT, why),
+        Err(why) => {
+            let (status, why) = unanswered(why);
+            refused(status, why)
+        }
     }
 }
 
-/// The error for a command from a client that does not say what it has seen.
-const NO_KNOWLEDGE: &str = "send the `id` of the last message of /events as the header Weeder-Seen, or send `hold`";
+/// The status and the words for a line without an answer.
+fn unanswered(why: Unanswered) -> (StatusCode, String) {
+    match why {
+        Unanswered::Held => (StatusCode::PRECONDITION_FAILED, "hold came first, so this was not sent".to_owned()),
+        Unanswered::Late => (
+            StatusCode::PRECONDITION_FAILED,
+            "this came more than a second late, so it was not sent: look at the machine, then try again".to_owned(),
+        ),
+        Unanswered::NotTyped(why) => (StatusCode::SERVICE_UNAVAILABLE, why),
+        Unanswered::Unknown(why) => (
+            StatusCode::GATEWAY_TIMEOUT,
+            format!("{why}. The machine may have done this, or may still do it: look at it"),
+        ),
+    }
+}
 
 /// Holds all machines at once. Every client that is let in may do this. Returns for each machine why it has not obeyed,
 /// or nothing, and the time of the last one that has.
 async fn hold_all(State(served): State<Arc<Served>>, Extension(visitor): Extension<Visitor>) -> impl IntoResponse {
     visitor.enter(Stage::Holding);
     let since = Instant::now();
-    let hub = &served.hub;
-    let holds = served.machines.iter().map(|machine| async move {
-        let answer = machine.take(hub, Order::Hold, String::new(), 0).await;
-        (answer, since.elapsed())
-    });
+    let holds = served.machines.iter().map(|machine| async move { (machine.hold().await, since.elapsed()) });
     let (mut machines, mut last_ms) = (Vec::new(), None);
     for (Machine { name, .. }, (answer, time)) in served.machines.iter().zip(join_all(holds).await) {
         let error = match answer {
             Ok(lines) => lines.into_iter().next_back().filter(|line| line.starts_with("error:")),
-            Err(why) => Some(why.to_string()),
+            Err(why) => Some(unanswered(why).1),
         };
         match &error {
             Some(why) => (served.tell)(&format!("{name} has not obeyed HOLD: {why}.")),
@@ -355,25 +367,21 @@ fn heard(hub: &Arc<Hub>) -> impl Stream<Item = Message> + use<> {
 mod tests {
     use super::*;
     use std::pin::pin;
-    use tokio::runtime;
 
-    #[test]
-    fn a_page_that_is_too_far_behind_gets_a_last_message_and_may_connect_again() {
-        let runtime = runtime::Builder::new_current_thread().enable_time().build().unwrap();
-        runtime.block_on(async {
-            let hub = Arc::new(Hub::new(1, 5000, Box::new(link::moment::Moment::now)));
-            let mut page = pin!(heard(&hub).map(|message| message.text));
-            for number in 0..1000 {
-                hub.event(0, &number.to_string());
-            }
-            assert!(page.next().await.unwrap().contains("lost"));
-            assert_eq!(page.next().await.as_deref(), Some(r#"{"is":"dropped"}"#));
-            assert_eq!(page.next().await, None);
-            let mut page = pin!(heard(&hub).map(|message| message.text));
-            assert!(page.next().await.unwrap().contains("lost"));
-            assert_eq!(page.next().await.as_deref(), Some(r#"{"is":"beat"}"#));
-            hub.there(0, "0.2.0", &[], &[]);
-            assert!(page.next().await.unwrap().contains("there"));
-        });
+    #[tokio::test]
+    async fn a_page_that_is_too_far_behind_gets_a_last_message_and_may_connect_again() {
+        let hub = Arc::new(Hub::new(1, 5000, Box::new(link::moment::Moment::now)));
+        let mut page = pin!(heard(&hub).map(|message| message.text));
+        for number in 0..1000 {
+            hub.news(0, serde_json::json!({ "is": "event", "said": number }));
+        }
+        assert!(page.next().await.unwrap().contains("lost"));
+        assert_eq!(page.next().await.as_deref(), Some(r#"{"is":"dropped"}"#));
+        assert_eq!(page.next().await, None);
+        let mut page = pin!(heard(&hub).map(|message| message.text));
+        assert!(page.next().await.unwrap().contains("lost"));
+        assert_eq!(page.next().await.as_deref(), Some(r#"{"is":"beat"}"#));
+        hub.news(0, serde_json::json!({ "is": "there" }));
+        assert!(page.next().await.unwrap().contains("there"));
     }
 }

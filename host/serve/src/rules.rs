@@ -21,15 +21,6 @@ pub enum Reach {
     },
 }
 
-/// How to handle a line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Order {
-    /// Hold, before all waiting commands.
-    Hold,
-    /// Type it after the previous commands have been answered.
-    Type,
-}
-
 /// Why a line is not passed on to the machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum Forbidden {
@@ -55,66 +46,36 @@ pub enum Forbidden {
     ChangesWire,
 }
 
-/// Decides whether and how a line may be typed from there.
+/// Decides whether a line may be typed from there.
 ///
 /// # Errors
 /// Why it is not allowed, and where it is.
-pub fn allow(line: &str, reach: Reach) -> Result<Order, Forbidden> {
+pub fn allow(line: &str, reach: Reach) -> Result<(), Forbidden> {
     // The machine does not answer a line without a word.
     if !link::is_command(line) || line.trim().is_empty() {
         return Err(Forbidden::NoLine);
     }
+    // Every client may hold. The machine itself reports errors in a line of the operator's.
+    let Reach::Lan { may_start } = reach else { return Ok(()) };
     if link::is_hold(line) {
-        return Ok(Order::Hold);
+        return Ok(());
     }
-    match (reach, link::command(line).map(|command| command.action)) {
-        // The machine itself reports errors in the line.
-        (Reach::Here, _) => Ok(Order::Type),
-        (Reach::Lan { .. }, Err(_)) => Err(Forbidden::Unknown),
-        (Reach::Lan { may_start }, Ok(action)) => match why_not(action) {
-            Some(Forbidden::NoStart) if may_start => Ok(Order::Type),
-            Some(why) => Err(why),
-            None => Ok(Order::Type),
-        },
-    }
+    let action = link::command(line).map_err(|_| Forbidden::Unknown)?.action;
+    why_not(action).filter(|&why| !(may_start && why == Forbidden::NoStart)).map_or(Ok(()), Err)
 }
 
 /// Why a command is refused over the network. Every new command must be added here.
 fn why_not(action: Action) -> Option<Forbidden> {
+    use Action::*;
     match action {
-        Action::Help
-        | Action::Explain
-        | Action::Status
-        | Action::GetAll
-        | Action::Get
-        | Action::Hold
-        | Action::EventsOn
-        | Action::Examples
-        | Action::Dump
-        | Action::Version => None,
+        Help | Explain | Status | GetAll | Get | Hold | EventsOn | Examples | Dump | Version => None,
         // A client that has not seen the fault must not clear a latched alarm.
-        Action::Start | Action::Clear => Some(Forbidden::NoStart),
-        Action::StartNow => Some(Forbidden::Unseen),
-        Action::CalibrateServo
-        | Action::ServoIn
-        | Action::ServoOut
-        | Action::Servo
-        | Action::TestRow
-        | Action::TestWatchdog => Some(Forbidden::MovesTool),
-        Action::Set
-        | Action::Save
-        | Action::Revert
-        | Action::Defaults
-        | Action::CalibrateStart
-        | Action::Calibrate
-        | Action::LabelPlant
-        | Action::LabelWeed
-        | Action::Feature
-        | Action::TeachPlant
-        | Action::TeachWeed
-        | Action::Forget
-        | Action::ForgetAll => Some(Forbidden::ChangesMachine),
-        Action::EventsOff | Action::PlotOn | Action::PlotOff | Action::PlotTeleplot => Some(Forbidden::ChangesWire),
+        Start | Clear => Some(Forbidden::NoStart),
+        StartNow => Some(Forbidden::Unseen),
+        CalibrateServo | ServoIn | ServoOut | Servo | TestRow | TestWatchdog => Some(Forbidden::MovesTool),
+        Set | Save | Revert | Defaults | CalibrateStart | Calibrate | LabelPlant | LabelWeed | Feature | TeachPlant
+        | TeachWeed | Forget | ForgetAll => Some(Forbidden::ChangesMachine),
+        EventsOff | PlotOn | PlotOff | PlotTeleplot => Some(Forbidden::ChangesWire),
     }
 }
 
@@ -126,44 +87,27 @@ mod tests {
     const STARTING: Reach = Reach::Lan { may_start: true };
 
     /// Every command, under its rule in the manual's table.
-    const HARMLESS: [&str; 11] =
-        ["help", "help k", "status", "get", "get k", "events on", "examples", "dump", "version", "  status ", "get  k"];
-    const STARTS: [&str; 4] = ["start", "clear", " start", "clear  "];
-    const NEVER: [(&str, Forbidden); 27] = [
-        ("start now", Forbidden::Unseen),
-        ("  start   now ", Forbidden::Unseen),
-        ("servo in", Forbidden::MovesTool),
-        ("servo out", Forbidden::MovesTool),
-        ("servo 1500", Forbidden::MovesTool),
-        ("test row", Forbidden::MovesTool),
-        ("test row 900", Forbidden::MovesTool),
-        ("test watchdog", Forbidden::MovesTool),
-        ("calibrate servo", Forbidden::MovesTool),
-        ("calibrate start", Forbidden::ChangesMachine),
-        ("calibrate 10000", Forbidden::ChangesMachine),
-        ("calibrate 10000 force", Forbidden::ChangesMachine),
-        ("set k 3", Forbidden::ChangesMachine),
-        ("set margin_mm 0", Forbidden::ChangesMachine),
-        ("save", Forbidden::ChangesMachine),
-        ("revert", Forbidden::ChangesMachine),
-        ("defaults", Forbidden::ChangesMachine),
-        ("label plant", Forbidden::ChangesMachine),
-        ("label weed force", Forbidden::ChangesMachine),
-        ("teach 3", Forbidden::ChangesMachine),
-        ("teach plant", Forbidden::ChangesMachine),
-        ("forget 3", Forbidden::ChangesMachine),
-        ("forget all", Forbidden::ChangesMachine),
-        ("events off", Forbidden::ChangesWire),
-        ("plot on", Forbidden::ChangesWire),
-        ("plot off", Forbidden::ChangesWire),
-        ("plot teleplot", Forbidden::ChangesWire),
+    const RULES: [(Option<Forbidden>, &[&str]); 9] = [
+        (None, &["help", "help k", "status", "get", "get k", "events on", "examples", "dump", "version"]),
+        (None, &["  status ", "get  k"]),
+        (Some(Forbidden::NoStart), &["start", "clear", " start", "clear  "]),
+        (Some(Forbidden::Unseen), &["start now", "  start   now "]),
+        (
+            Some(Forbidden::MovesTool),
+            &["servo in", "servo out", "servo 1500", "test row", "test row 900", "test watchdog", "calibrate servo"],
+        ),
+        (Some(Forbidden::ChangesMachine), &["set k 3", "set margin_mm 0", "save", "revert", "defaults"]),
+        (Some(Forbidden::ChangesMachine), &["calibrate start", "calibrate 10000", "calibrate 10000 force"]),
+        (
+            Some(Forbidden::ChangesMachine),
+            &["label plant", "label weed force", "teach 3", "teach plant", "forget 3", "forget all"],
+        ),
+        (Some(Forbidden::ChangesWire), &["events off", "plot on", "plot off", "plot teleplot"]),
     ];
 
     /// All of these lines, and why the network may not type them.
     fn lines() -> impl Iterator<Item = (&'static str, Option<Forbidden>)> {
-        let harmless = HARMLESS.map(|line| (line, None)).into_iter();
-        let starts = STARTS.map(|line| (line, Some(Forbidden::NoStart)));
-        harmless.chain(starts).chain(NEVER.map(|(line, why)| (line, Some(why))))
+        RULES.into_iter().flat_map(|(why, lines)| lines.iter().map(move |&line| (line, why)))
     }
 
     #[test]
@@ -171,12 +115,12 @@ mod tests {
         for (line, why) in lines() {
             let started = why.filter(|why| *why != Forbidden::NoStart);
             for (reach, why) in [(Reach::Here, None), (WATCHING, why), (STARTING, started)] {
-                assert_eq!(allow(line, reach), why.map_or(Ok(Order::Type), Err), "{line:?} from {reach:?}");
+                assert_eq!(allow(line, reach), why.map_or(Ok(()), Err), "{line:?} from {reach:?}");
             }
         }
         for line in ["hold", " hold", "hold   ", "HOLD", "Hold", "hold.", "HOLD !"] {
             for reach in [Reach::Here, WATCHING, STARTING] {
-                assert_eq!(allow(line, reach), Ok(Order::Hold), "{line:?} from {reach:?}");
+                assert!(link::is_hold(line) && allow(line, reach) == Ok(()), "{line:?} from {reach:?}");
             }
         }
     }
@@ -224,9 +168,9 @@ mod tests {
         for line in ["starts", "start later", "start now now", "set k", "launch", "help me", "servo", "\u{1}"] {
             assert!(allow(line, STARTING).is_err(), "{line:?}");
         }
-        assert_eq!(allow("launch", Reach::Here), Ok(Order::Type));
+        assert_eq!(allow("launch", Reach::Here), Ok(()));
         // The machine reads capital letters as small ones.
-        assert_eq!(allow("START", STARTING), Ok(Order::Type));
+        assert_eq!(allow("START", STARTING), Ok(()));
         assert_eq!(allow("START", WATCHING), allow("start", WATCHING));
         assert!(allow("Set margin_mm 5", STARTING).is_err());
     }

@@ -6,7 +6,7 @@ use crate::track::STANDING_M;
 use link::settings::Setting;
 use link::{Class, EventLine, Mode, Status};
 use logbook::follower::Follower;
-use logbook::log::Entry;
+use logbook::log::{Entry, Kind};
 use std::ops::Range;
 
 /// Time before and after a stretch in which the machine is assumed to have stood, in ms. A fix in this time belongs to
@@ -64,9 +64,9 @@ impl Reading {
         let next = self.wheel.partition_point(|rolled| rolled.time_ms < time_ms);
         let before = next.checked_sub(1).map(|place| self.wheel[place]);
         match (before, self.wheel.get(next)) {
-            (Some(from), Some(to)) if Self::is_gap(&from, to) => None,
             (Some(from), Some(to)) => {
-                Some(from.m + (to.m - from.m) * (time_ms - from.time_ms) / (to.time_ms - from.time_ms))
+                let share = (time_ms - from.time_ms) / (to.time_ms - from.time_ms);
+                (!Self::is_gap(&from, to)).then_some(from.m + (to.m - from.m) * share)
             }
             (None, Some(&at)) | (Some(at), None) => ((time_ms - at.time_ms).abs() <= STANDING_MS).then_some(at.m),
             (None, None) => None,
@@ -75,7 +75,11 @@ impl Reading {
 
     pub(super) fn status(&mut self, status: Status, at_m: f64, entry: &Entry) {
         self.wheel.push(Rolled { time_ms: entry.time_ms as f64, m: at_m, line: entry.number });
-        let did = did(&status);
+        let did = match (status.mode, status.tool_out) {
+            (Mode::Work, false) => Did::Weeded,
+            (Mode::Work, true) => Did::Spared,
+            (Mode::Hold | Mode::Alarm, _) => Did::Rolled,
+        };
         match self.ground.last_mut() {
             None => self.ground.push(Ground::begin(did, at_m, entry.time_ms)),
             Some(passed) => {
@@ -104,11 +108,12 @@ impl Reading {
         self.ground.push(Ground::begin(did, at_m, time_ms));
     }
 
-    /// The link ends or begins while the machine is at work.
-    pub(super) fn restart(&mut self, entry: &Entry) {
-        let Some(&Rolled { m, .. }) = self.wheel.last() else { return };
-        let mark = Event::mark(EventKind::Restart, String::new(), entry.number, entry.time_ms as f64, m);
-        self.events.push(mark);
+    /// The link ends or begins with the first of these lines. Marks a restart of the machine at work.
+    pub(super) fn restart(&mut self, entry: &Entry, lines: &[Entry]) {
+        let (Some(status), Some(&Rolled { m, .. })) = (&self.last_status, self.wheel.last()) else { return };
+        if let Some(text) = restarted(lines).filter(|_| status.mode == Mode::Work) {
+            self.events.push(Event::mark(EventKind::Restart, text, entry.number, entry.time_ms as f64, m));
+        }
     }
 
     pub(super) fn event(&mut self, entry: &Entry, event: &EventLine, follower: &Follower) {
@@ -160,11 +165,22 @@ impl Reading {
     }
 }
 
-/// The work of a machine with this status.
-fn did(status: &Status) -> Did {
-    match (status.mode, status.tool_out) {
-        (Mode::Work, false) => Did::Weeded,
-        (Mode::Work, true) => Did::Spared,
-        (Mode::Hold | Mode::Alarm, _) => Did::Rolled,
-    }
+/// The text of the mark of a machine whose link ended or began with the first of these lines. `None` if it has worked on
+/// without its link, or if that is unknown.
+fn restarted(lines: &[Entry]) -> Option<String> {
+    let status = |entry: &Entry| Status::parse(&entry.text).filter(|_| entry.kind == Kind::Status);
+    let has_restarted = match lines.iter().find_map(status) {
+        Some(next) => next.mode != Mode::Work,
+        None => lines.iter().any(|entry| entry.kind == Kind::Connected),
+    };
+    let before_status = lines.iter().take_while(|&entry| status(entry).is_none());
+    let cause = before_status.filter_map(|entry| reset_cause(&entry.text)).last();
+    let cause = cause.map_or(String::new(), |cause| format!(" ({cause})"));
+    has_restarted.then(|| format!("restarted{cause} while at work: not weeded from here"))
+}
+
+/// The reset's cause in a line, such as the greeting.
+fn reset_cause(line: &str) -> Option<&str> {
+    let (_, rest) = line.split_once("reset by ")?;
+    rest.split(|letter: char| !(letter.is_alphanumeric() || letter == '_')).next().filter(|cause| !cause.is_empty())
 }

@@ -65,15 +65,6 @@ impl fmt::Display for Mark {
     }
 }
 
-/// The results of a line.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Heard {
-    /// Complete fixes. Several come if earlier fixes had jumped and are accepted after all.
-    pub fixes: Vec<Fix>,
-    /// The marks.
-    pub marks: Vec<Mark>,
-}
-
 /// The counts of a receiver.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {

@@ -1,7 +1,8 @@
 //! What happens in a session.
 
-use crate::settings::Settings;
+use crate::settings::{Settings, helps};
 use crate::{EventLine, Status};
+use serde_json::{Value, json};
 
 /// Something that happened in a session.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -56,6 +57,39 @@ pub enum Happening {
     Settings(Settings, Vec<String>),
     /// The examples after a command has changed some, a line each.
     Examples(Vec<String>),
+}
+
+impl Happening {
+    /// This in the form of `News` in `page/src/link/session.ts`.
+    pub fn news(&self) -> Value {
+        match self {
+            Self::Started { greeting, while_at_work } => {
+                json!({ "is": "restarted", "said": greeting, "wasAtWork": while_at_work.is_some() })
+            }
+            Self::Connected { version, shown, examples, .. } => {
+                json!({ "is": "there", "version": version, "settings": shown, "examples": examples, "help": helps() })
+            }
+            Self::Lost(why) => json!({ "is": "lost", "why": why }),
+            Self::Status(_, line) => json!({ "is": "status", "said": line }),
+            Self::Event(_, line) => json!({ "is": "event", "said": line }),
+            Self::Settings(_, lines) => json!({ "is": "settings", "said": lines }),
+            Self::Examples(lines) => json!({ "is": "examples", "said": lines }),
+            Self::Command(line) => json!({ "is": "command", "line": line }),
+            Self::Answer(line) => json!({ "is": "answer", "line": line }),
+            Self::Answered { number, refusal, .. } => {
+                json!({ "is": "answered", "number": number, "refusal": refusal })
+            }
+            Self::Unanswered { number, why, .. } => {
+                let (why, because) = match why {
+                    Unanswered::Late => ("late", None),
+                    Unanswered::Held => ("held", None),
+                    Unanswered::NotTyped(because) => ("notTyped", Some(because)),
+                    Unanswered::Unknown(because) => ("unknown", Some(because)),
+                };
+                json!({ "is": "unanswered", "number": number, "why": why, "because": because })
+            }
+        }
+    }
 }
 
 /// Why a command will not be answered.

@@ -32,7 +32,7 @@ pub fn read_csv(path: &Path) -> Result<Vec<PlotRecord>, FileError> {
                 plot.replication, plot.speed_km_h, plot.spacing_cm
             )));
         }
-        plots.push((line.number(), plot));
+        plots.push((line.number, plot));
     }
     if plots.iter().all(|(_, plot)| plot.is_blank())
         && let Some(line) = table.lines().next()
