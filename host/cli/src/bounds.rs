@@ -2,12 +2,11 @@
 //! The firmware and its budgets are this repository's. Commands that flash a firmware first check here whether its
 //! bounds are proved.
 
-use crate::output::{print, tell};
-use crate::program::Finding;
 use anyhow::{Result, bail, ensure};
 use avr_bounds::command::{Options, Report, report};
 use avr_bounds::{Budgets, Held, Program};
 use clap::Args;
+use frame::{Finding, print, tell};
 use std::path::{Path, PathBuf};
 use uno::elf::Image;
 use uno_run::firmware;

@@ -1,15 +1,12 @@
 //! `weeder examples`: the taught examples of a machine as a table, to save, to train from, and to teach to another
 //! machine.
 
-use crate::destination::{OutName, Replace};
-use crate::output::{say, tell};
 use crate::ports::Port;
-use crate::program::Finding;
-use crate::source;
 use anyhow::{Result, bail, ensure};
 use clap::{Args, Subcommand};
 use comfy_table::{Table, presets};
 use field::row::Kind;
+use frame::{Finding, OutName, Replace, say, source, tell};
 use link::examples::{self, Taught, contradiction, example_of, features_of};
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};

@@ -4,11 +4,10 @@
 //! --speeds 1,2 -->`. The command runs, and its output becomes the block. The output is the same on every machine: run
 //! times go to standard error, which is left out.
 
-use crate::output::{say, tell};
-use crate::program::Finding;
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use files::whole_file;
+use frame::{Finding, say, tell};
 use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -5,10 +5,10 @@ mod bootloader;
 
 use self::bootloader::{ATMEGA328P, Heard, Signature, heard};
 use crate::bounds::Firmware;
-use crate::output::say;
 use crate::ports::Port;
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
+use frame::say;
 use link::Claim;
 use link::row_names::Board;
 use std::io;

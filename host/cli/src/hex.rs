@@ -2,10 +2,9 @@
 //! use this command, so they contain a proved firmware.
 
 use crate::bounds::Firmware;
-use crate::destination::{OutName, Replace};
-use crate::output::say;
 use anyhow::Result;
 use clap::Args;
+use frame::{OutName, Replace, say};
 use uno::elf::Image;
 use uno::hex;
 

@@ -41,8 +41,7 @@ mod virtual_uno;
 
 use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
-use frame::program::Finding;
-use frame::{course, destination, numbers, output, program, progress, row, source};
+use frame::{Finding, program, row};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -177,9 +176,9 @@ fn ctrl_c() -> Result<Arc<AtomicBool>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::destination::OutName;
-    use crate::program::parse;
     use clap::{Arg, Command};
+    use frame::OutName;
+    use frame::program::parse;
     use std::any::TypeId;
     use std::collections::BTreeSet;
     use std::ffi::OsString;

@@ -1,13 +1,10 @@
 //! `weeder map`: shows logs with a satellite receiver on a map, and summarises them.
 
-use crate::destination::{OutName, Replace};
-use crate::numbers::number_within;
-use crate::output::{print, say, tell};
 use crate::receiver::AntennaArguments;
-use crate::source;
 use anyhow::Result;
 use clap::Args;
 use comfy_table::{Table, presets};
+use frame::{OutName, Replace, number_within, print, say, source, tell};
 use gps::job::{self, Wanted};
 use gps::summary::{Stand, Summary};
 use gps::wheel::Ratio;

@@ -11,10 +11,10 @@ mod terminal;
 mod view;
 
 use crate::ports::Ports;
-use crate::program::Finding;
 use crate::record::{self, Logs};
 use anyhow::Result;
 use clap::Args;
+use frame::Finding;
 use link::row_names::ALL;
 use link::session::HOLD;
 use std::path::PathBuf;

@@ -3,10 +3,9 @@
 //! A part names the program that computed it: the version, and a checksum of the program's file. The version alone is
 //! not enough, because an unreleased build has the version of the last release.
 
-use crate::destination::{OutFile, OutFolder, OutName, Replace};
-use crate::output::{say, tell};
 use anyhow::{Context, Result};
 use clap::{Args, builder::PossibleValuesParser};
+use frame::{OutFile, OutFolder, OutName, Replace, say, tell};
 use serde::Serialize;
 use std::env;
 use std::fs;

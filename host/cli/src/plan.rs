@@ -1,10 +1,8 @@
 //! `weeder plan`: creates a randomised plan of a field trial, as a table to fill in.
 
-use crate::destination::{OutName, Replace};
-use crate::numbers::{number_within, whole_within};
-use crate::output::{self, print, say};
 use anyhow::Result;
 use clap::Args;
+use frame::{OutName, Replace, command_line, number_within, print, say, whole_within};
 use study::plan::Plan;
 use study::sweep::{SPACINGS_CM, SPEEDS_KM_H};
 use study::table::distinct;
@@ -58,7 +56,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         seed: arguments.seed,
     };
     let notes = [
-        format!("Randomised: {}", output::command_line()?),
+        format!("Randomised: {}", command_line()?),
         "Mark out the plots side by side in this order; a block is a stretch of field that is as even as it can be."
             .to_owned(),
         "Count weeds on the same marked ground before and after, and the plants; write down area and time with turns."

@@ -3,10 +3,10 @@
 //! A port is a path, such as /dev/ttyACM0, or a board's name from `weeder rows`. The name finds the board at any port.
 //! Messages about a named board begin with its name.
 
-use crate::output::tell;
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use etcetera::BaseStrategy;
+use frame::tell;
 use link::Link;
 use link::connection::Opener;
 use link::row_names::{Board, Names, Plugged, Row, plugged, wrong_with};

@@ -2,11 +2,11 @@
 //!
 //! [`gps`] interprets its bytes. A file can replace the port: it is read at the pace of its times.
 
-use crate::numbers::{number_within, whole_within};
 use crate::ports::{Chosen, Named, named};
 use anyhow::{Result, anyhow, bail, ensure};
 use clap::Args;
 use files::bounded_file;
+use frame::{number_within, whole_within};
 use gps::playback::{self, Piece};
 use gps::recorder::Lines;
 use gps::{Antenna, Recorder};

@@ -1,12 +1,11 @@
 //! `weeder record`: logs the machine's output to a file, or each row's to its own file.
 
 use crate::ctrl_c;
-use crate::destination::{OutName, Replace};
-use crate::output::tell;
 use crate::ports::{Chosen, Ports};
 use crate::receiver::GpsArguments;
 use anyhow::{Result, bail, ensure};
 use clap::Args;
+use frame::{OutName, Replace, tell};
 use gps::recorder::Lines;
 use link::advice;
 use link::rows::{Rows, What};

@@ -1,10 +1,10 @@
 //! `weeder rows`: lists the Unos and the rows that they control, and finds them again at other ports.
 
-use crate::output::say;
 use crate::ports::{NamesFile, unnamed};
 use anyhow::Result;
 use clap::{Args, Subcommand};
 use comfy_table::{Table, presets};
+use frame::say;
 use link::row_names::{Board, Names, Plugged, plugged};
 use serde_json::{Value, json};
 

@@ -1,11 +1,10 @@
 //! `weeder serve`: the page, from the computer that has the serial port to a phone.
 
 use crate::ctrl_c;
-use crate::numbers::whole_within;
-use crate::output::{say, tell};
 use crate::ports::Ports;
 use anyhow::Result;
 use clap::Args;
+use frame::{say, tell, whole_within};
 use serve::page::Page;
 use serve::{Server, Setup};
 use std::env;

@@ -10,12 +10,11 @@ mod state;
 
 use self::state::State;
 use crate::input;
-use crate::output::{say, tell};
 use crate::ports::Port;
-use crate::source;
 use anyhow::{Context, Error, Result};
 use clap::Args;
 use files::{bounded_file, whole_file};
+use frame::{say, source, tell};
 use link::row_names::Board;
 use link::settings::{self, Setting, name, range, unit};
 use link::{ConsoleLine, EventLine, Link, LinkError, Mode};

@@ -1,14 +1,11 @@
 //! `weeder settings`: saves the machine's settings to a file, compares them, and sends them to a machine.
 
-use crate::destination::{OutFolder, OutName, Replace};
-use crate::output::say;
 use crate::ports::{Chosen, Ports};
-use crate::program::Finding;
-use crate::source;
 use anyhow::{Result, ensure};
 use clap::{Args, Subcommand};
 use comfy_table::{Table, presets};
 use field::conditions::Conditions;
+use frame::{Finding, OutFolder, OutName, Replace, say, source};
 use link::row_names::Row;
 use link::settings::{self, Setting, SettingsError, Shown, name, unit};
 use link::settings_file::{self, Named};

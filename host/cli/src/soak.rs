@@ -1,13 +1,9 @@
 //! `weeder soak`: hours of the decisions and minutes of the real firmware, with random faults.
 
-use crate::destination::{OutName, Replace};
-use crate::numbers::whole_within;
-use crate::output::{say, tell};
 use crate::part::{self, Part};
-use crate::program::Finding;
-use crate::progress::{Show, with_bar};
 use anyhow::{Result, ensure};
 use clap::Args;
+use frame::{Finding, OutName, Replace, Show, say, tell, whole_within, with_bar};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use soak::{Plan, SoakError, Tally};

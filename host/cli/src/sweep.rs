@@ -1,16 +1,16 @@
 //! `weeder sweep`: a result of the simulated trial against one or two of its parameters.
 
-use crate::destination::{OutFile, OutName, Replace};
-use crate::numbers::{number_within, whole_within};
-use crate::output::{print, say, tell};
 use crate::part::{Part, Shown};
-use crate::progress::with_bar;
-use crate::source::{self, offering};
 use anyhow::Result;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use comfy_table::Table;
 use field::conditions::{self, Conditions, PARAMETERS};
+use frame::{
+    OutFile, OutName, Replace, number_within, print, say,
+    source::{self, offering},
+    tell, whole_within, with_bar,
+};
 use link::settings::{self, Setting};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;

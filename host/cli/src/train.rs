@@ -1,13 +1,14 @@
 //! `weeder train`: trains an example table from labelled detections, and reports how well it separates plants from
 //! weeds.
 
-use crate::destination::{OutFile, OutName, Replace, write_if_asked};
-use crate::numbers::whole_within;
-use crate::output::{say, tell};
-use crate::source::{self, offering};
 use anyhow::{Result, bail, ensure};
 use clap::builder::TypedValueParser;
 use clap::{ArgGroup, Args};
+use frame::{
+    OutFile, OutName, Replace, say,
+    source::{self, offering},
+    tell, whole_within, write_if_asked,
+};
 use link::examples::CAPACITY;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};

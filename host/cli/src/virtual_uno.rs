@@ -1,15 +1,13 @@
 //! `weeder virtual-uno`: an Uno without an Uno, at a pseudo terminal that any serial program opens.
 
-use crate::course::CourseArguments;
 use crate::ctrl_c;
 use crate::flash;
 use crate::input;
-use crate::numbers::{number_within, whole_within};
-use crate::output::{say, tell};
 use anyhow::{Result, anyhow, ensure};
 use clap::Args;
 use field::machine::Machine;
 use field::motion::mm_s;
+use frame::{CourseArguments, number_within, say, tell, whole_within};
 use gps::simulated::{ReceiverSetup, SimulatedReceiver, Trouble};
 use std::io;
 use std::ops::RangeInclusive;

@@ -1,7 +1,6 @@
 //! Arguments that several commands share: the row, and the machine that rolls along it.
 
-use crate::numbers::{number_within, whole_within};
-use crate::source;
+use crate::{number_within, source, whole_within};
 use anyhow::{Result, ensure};
 use clap::Args;
 use field::conditions::{self, Conditions};

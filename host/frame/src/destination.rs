@@ -9,7 +9,7 @@
 //! So no command replaces a file without [`Replace`], the option `--force`. A test in `main.rs` checks every argument
 //! that names an output.
 
-use crate::output::say;
+use crate::say;
 use anyhow::{Context, Error, Result, bail, ensure};
 use clap::Args;
 use files::whole_file;

@@ -11,19 +11,17 @@ use std::env;
 use std::fmt::Arguments;
 use std::io::{self, ErrorKind, Write};
 
-/// Prints a line of a result. Takes the arguments of `println!`, and returns the result of [`print()`](crate::output::print()).
+/// Prints a line of a result. Takes the arguments of `println!`, and returns the result of [`print()`](crate::print()).
 #[macro_export]
 macro_rules! say {
-    ($($words:tt)*) => { $crate::output::print(format_args!("{}\n", format_args!($($words)*))) };
+    ($($words:tt)*) => { $crate::print(format_args!("{}\n", format_args!($($words)*))) };
 }
 
 /// Prints a message. Takes the arguments of `eprintln!`.
 #[macro_export]
 macro_rules! tell {
-    ($($words:tt)*) => { $crate::output::tell_line(format_args!($($words)*)) };
+    ($($words:tt)*) => { $crate::tell_line(format_args!($($words)*)) };
 }
-
-pub use {say, tell};
 
 /// Prints a part of the result, unchanged.
 ///

@@ -1,11 +1,8 @@
 //! `weeder sim`: the real firmware on a virtual Uno, on a simulated row or on a recording of a real encoder.
 
-use crate::course::CourseArguments;
-use crate::destination::{OutFile, OutFolder, OutName, Replace, write_if_asked};
-use crate::output::{print, say};
-use crate::program::Finding;
-use crate::progress::with_bar;
-use crate::source;
+use crate::{
+    CourseArguments, Finding, OutFile, OutFolder, OutName, Replace, print, say, source, with_bar, write_if_asked,
+};
 use anyhow::Result;
 use clap::Args;
 use field::motion::mm_s;

@@ -1,7 +1,7 @@
 //! Input files of commands: `-` is standard input. Some words are known names instead of files, and a shell's
 //! completion offers them.
 
-use crate::output::tell;
+use crate::tell;
 use clap::builder::{OsStringValueParser, PossibleValue, TypedValueParser};
 use clap::{Arg, Command};
 use field::conditions::{Conditions, presets};

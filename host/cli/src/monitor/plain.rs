@@ -9,11 +9,10 @@
 
 use super::addressed;
 use crate::input::{self, Line};
-use crate::output::tell;
 use crate::ports::Chosen;
-use crate::program::Finding;
 use crate::record::Logs;
 use anyhow::{Result, ensure};
+use frame::{Finding, tell};
 use link::advice;
 use link::examples::Heading;
 use link::rows::{Heard, Hold, Rows, What};

@@ -1,8 +1,8 @@
 //! The measurements of a set-up: the servo's times, the wheel, and the margin that follows from them.
 
 use super::{End, Guide};
-use crate::output::{say, tell};
 use anyhow::{Error, Result, bail};
+use frame::{say, tell};
 use link::settings::{self, Setting, name};
 use link::{ConsoleLine, EventLine, Status};
 use set_up::{SetUp, Step};

@@ -1,7 +1,7 @@
 //! The file of a set-up: its board, completed steps, measurements, and the board's settings as they were last.
 
-use crate::output::tell;
 use anyhow::{Result, bail};
+use frame::tell;
 use link::row_names::Board;
 use link::settings::{Setting, name};
 use set_up::SetUp;
