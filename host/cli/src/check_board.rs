@@ -86,7 +86,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     let mut report = result?;
     report.board.clone_from(&arguments.board);
     let printed = print(format_args!("{}", if arguments.json { report.json() } else { report.text() }));
-    write_if_asked(page.as_ref(), "Written", arguments.json, |to| to.write_all(report.page().as_bytes()))?;
+    write_if_asked(page.as_ref(), "Written", arguments.json, |to| Ok(to.write_all(report.page().as_bytes())?))?;
     printed?;
     Ok(Finding::of(report.is_good()))
 }

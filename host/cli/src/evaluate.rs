@@ -101,7 +101,7 @@ fn write_report(
         row: None,
     };
     let html = page.html()?;
-    folder.write(REPORT, |to| to.write_all(html.as_bytes()))
+    folder.write(REPORT, |to| Ok(to.write_all(html.as_bytes())?))
 }
 
 /// The whole analysis. Without a model, `no_model` says why.

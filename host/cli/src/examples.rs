@@ -83,7 +83,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
                 if *json { say!("{:#}", Value::from_iter(taught.iter().filter_map(in_json))) } else { Ok(()) };
             if let Some(file) = file {
                 let objects: Vec<Labelled> = taught.iter().filter_map(object).collect();
-                file.write(|to| listing::write_csv(&objects, to))?;
+                file.write(|to| Ok(listing::write_csv(&objects, to)?))?;
                 if !json {
                     say!("The taught examples are in {}: {} examples", file.path().display(), taught.len())?;
                 }

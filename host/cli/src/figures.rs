@@ -83,10 +83,8 @@ fn print(command: &str) -> Result<String> {
     // Status 1 is a finding, such as a damaged plant.
     ensure!(matches!(output.status.code(), Some(0 | 1)), "`{command}` fails: run it to see why");
     let printed = String::from_utf8(output.stdout).with_context(|| format!("`{command}` prints no text"))?;
-    let lines = printed.lines().map(str::trim_end);
-    let lines: Vec<&str> = lines.collect();
-    let text = lines.join("\n");
-    Ok(format!("{}\n", text.trim_matches('\n')))
+    let lines: Vec<&str> = printed.lines().map(str::trim_end).collect();
+    Ok(format!("{}\n", lines.join("\n").trim_matches('\n')))
 }
 
 /// The lines that differ, those of the page first.

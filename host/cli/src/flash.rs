@@ -6,7 +6,7 @@ mod bootloader;
 use self::bootloader::{ATMEGA328P, Heard, Signature, heard};
 use crate::bounds::Firmware;
 use crate::ports::Port;
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use clap::Args;
 use frame::say;
 use link::Claim;
@@ -91,20 +91,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let folder = tempfile::tempdir().context("there is no room for a temporary file")?;
     let image = folder.path().join("weeder.hex");
     std::fs::write(&image, hex::text(&flash)).context("there is no room for a temporary file")?;
-    let written = avrdude::write(&image, &port, bootloader.baud)?;
-    ensure!(!written.port_is_gone, "{port} is gone while the Uno was written: plug it in, and flash it again. {WHOLE}");
-    ensure!(
-        !written.is_silent,
-        "avrdude fell silent and was ended: plug the Uno out and in, and flash it again. {WHOLE}"
-    );
-    if !written.succeeded {
-        bail!("avrdude did not succeed: {}", why(&claim, &port, bootloader, other, written.signature));
-    }
+    let (succeeded, signature) = avrdude::write(&image, &port, bootloader.baud)?;
+    ensure!(succeeded, "avrdude did not succeed: {}", why(&claim, &port, bootloader, other, signature));
     say!("Done: the Uno runs it. `weeder monitor --port {port}` talks to it.")
 }
-
-/// Writing cannot reach the bootloader.
-const WHOLE: &str = "The bootloader is not changed";
 
 /// Seconds from the reset until the firmware starts: the bytes go to the Uno and back, a page takes 5 ms to write, and
 /// the bootloader waits.

@@ -32,6 +32,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let elf = arguments.firmware.elf()?;
     let flash = Image::read(&elf)?.flash;
     arguments.firmware.check(&elf)?;
-    out.write(|to| to.write_all(hex::text(&flash).as_bytes()))?;
+    out.write(|to| Ok(to.write_all(hex::text(&flash).as_bytes())?))?;
     say!("Written     {}, {} bytes of flash", out.path().display(), flash.len())
 }

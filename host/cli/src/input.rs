@@ -3,7 +3,9 @@
 //! CR, LF or both end a line. A byte order mark is dropped, and UTF-16 is read, because some shells write both. A byte
 //! that is no text spoils its own line only. Lines are bounded, so that input without line ends is refused too.
 
-use std::io::{ErrorKind, Read};
+use std::io::{self, ErrorKind, Read};
+use std::sync::mpsc::{self, Receiver};
+use std::thread;
 
 /// The greatest length of a line in characters: more than a row's name and a command.
 const LIMIT: usize = 200;
@@ -119,20 +121,26 @@ impl Lines {
     }
 }
 
-/// Reads lines until the input ends, and passes each on at once. Ends early where `pass_on` returns false.
-pub fn read(mut from: impl Read, mut pass_on: impl FnMut(Line) -> bool) {
-    let (mut lines, mut bytes) = (Lines::default(), [0; 1024]);
-    loop {
-        let count = match from.read(&mut bytes) {
-            Ok(count) => count,
-            Err(error) if error.kind() == ErrorKind::Interrupted => continue,
-            // An input that is gone has ended. What came before is sent.
-            Err(_) => 0,
-        };
-        if !lines.take(&bytes[..count], count == 0).into_iter().all(&mut pass_on) || count == 0 {
-            return;
+/// The lines of standard input, each read once the caller has taken the one before. The channel ends with the input.
+pub fn typed() -> Receiver<Line> {
+    let (sender, typed) = mpsc::sync_channel(0);
+    // Reading blocks until a person types, so it has its own thread. The thread ends with the process.
+    thread::spawn(move || {
+        let (mut input, mut lines, mut bytes) = (io::stdin().lock(), Lines::default(), [0; 1024]);
+        loop {
+            let count = match input.read(&mut bytes) {
+                Ok(count) => count,
+                Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+                // An input that is gone has ended. What came before is sent.
+                Err(_) => 0,
+            };
+            let lines = lines.take(&bytes[..count], count == 0);
+            if !lines.into_iter().all(|line| sender.send(line).is_ok()) || count == 0 {
+                return;
+            }
         }
-    }
+    });
+    typed
 }
 
 #[cfg(test)]

@@ -78,11 +78,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         false => print(format_args!("{}\n", shown(&counted))),
     };
     let named: Vec<(&str, &Job)> = jobs.iter().map(|(name, job)| (name.as_str(), job)).collect();
-    out.write(|to| writeln!(to, "{}", map::features(&named)))?;
+    out.write(|to| Ok(writeln!(to, "{}", map::features(&named))?))?;
     if let Some(svg) = &svg {
         let jobs: Vec<&Job> = jobs.iter().map(|(_, job)| job).collect();
         match picture::draw(&jobs, &picture::Words::default()) {
-            Some(drawn) => svg.write(|to| svg::write(to, &drawn))?,
+            Some(drawn) => svg.write(|to| Ok(svg::write(to, &drawn)?))?,
             None => tell!("{} is not drawn: no event in the records has a position", svg.path().display()),
         }
     }

@@ -10,7 +10,7 @@ mod plain;
 mod terminal;
 mod view;
 
-use crate::ports::Ports;
+use crate::ports::{Ports, find};
 use crate::record::{self, Logs};
 use anyhow::Result;
 use clap::Args;
@@ -50,7 +50,8 @@ pub struct Arguments {
 /// # Errors
 /// If there is no such row, or the rest is no command; in words.
 fn addressed<'a>(line: &'a str, names: &[String], chosen: Option<usize>) -> Result<(Option<usize>, &'a str), String> {
-    let (to, command) = match line.split_once(':').map(|(name, command)| (row(name.trim(), names), command.trim())) {
+    let row = |name: &str| if name == ALL { Ok(None) } else { find(name, names).map(Some) };
+    let (to, command) = match line.split_once(':').map(|(name, command)| (row(name.trim()), command.trim())) {
         Some((Ok(to), command)) => (to, command),
         Some((Err(why), _)) if names.len() > 1 => return Err(why),
         _ => (chosen, line.trim()),
@@ -64,16 +65,9 @@ fn addressed<'a>(line: &'a str, names: &[String], chosen: Option<usize>) -> Resu
     }
 }
 
-fn row(name: &str, names: &[String]) -> Result<Option<usize>, String> {
-    match names.iter().position(|known| known == name) {
-        None if name != ALL => Err(format!("there is no row {name}: there are {}", names.join(", "))),
-        row => Ok(row),
-    }
-}
-
 /// Watches until the user quits.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
-    let chosen = arguments.ports.choose()?;
+    let chosen = arguments.ports.choose(None)?;
     let logs = arguments.log.as_deref().map(|out| Logs::open(out, &chosen)).transpose()?;
     let (rows, are_there) = record::open(&chosen)?;
     match arguments.plain {

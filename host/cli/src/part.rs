@@ -74,7 +74,7 @@ impl Part {
         let settings = serde_json::to_value(settings)?;
         let header = Header::new(self.program, command, self.shard, all, settings);
         let count = outcomes.len();
-        self.out.write(|to| shard::write(&header, outcomes, to))?;
+        self.out.write(|to| Ok(shard::write(&header, outcomes, to)?))?;
         say!("Written: part {} of the {command}, {count} of {all}, to {}", self.shard, self.out.path().display())?;
         tell!("Pace: {:.1} s", self.began.elapsed().as_secs_f64());
         Ok(())

@@ -64,7 +64,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         "Then: weeder evaluate THIS_FILE".to_owned(),
     ];
     if let Some(sheets) = &sheets {
-        sheets.write(|to| plan.write_sheets(to))?;
+        sheets.write(|to| Ok(plan.write_sheets(to)?))?;
     }
     match &out {
         None => {
@@ -73,7 +73,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             print(format_args!("{}", String::from_utf8_lossy(&table)))
         }
         Some(out) => {
-            out.write(|to| plan.write_csv(&notes, to))?;
+            out.write(|to| Ok(plan.write_csv(&notes, to)?))?;
             say!("Written: {}, {} plots in {} blocks", out.path().display(), plan.plots().len(), plan.blocks)
         }
     }

@@ -2,8 +2,8 @@
 //!
 //! [`gps`] interprets its bytes. A file can replace the port: it is read at the pace of its times.
 
-use crate::ports::{Chosen, Named, named};
-use anyhow::{Result, anyhow, bail, ensure};
+use crate::ports::{Chosen, Named, find, named};
+use anyhow::{Error, Result, anyhow, bail, ensure};
 use clap::Args;
 use files::bounded_file;
 use frame::{number_within, whole_within};
@@ -93,7 +93,7 @@ impl GpsArguments {
             return Ok(None);
         };
         let row = match name {
-            Some(name) => chosen.find(name)?,
+            Some(name) => find(name, &chosen.names()).map_err(Error::msg)?,
             None if chosen.rows.len() == 1 => 0,
             None => bail!(
                 "with several rows, name the row that records the receiver, as in `--gps {}={port}`",

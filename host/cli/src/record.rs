@@ -42,16 +42,13 @@ pub struct Arguments {
 
 /// Records until Ctrl-C.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let chosen = arguments.ports.choose_beside(arguments.gps.port())?;
+    let chosen = arguments.ports.choose(arguments.gps.port())?;
     let gps = arguments.gps.open(&chosen)?;
     let mut logs = Logs::open(&arguments.out, &chosen)?;
-    let mut gps = match gps {
-        Some((receiver, lines)) => {
-            logs.lines_at(receiver.row, logs.now_ms(receiver.row), &lines)?;
-            Some(receiver)
-        }
-        None => None,
-    };
+    if let Some((receiver, lines)) = &gps {
+        logs.lines_at(receiver.row, logs.now_ms(receiver.row), lines)?;
+    }
+    let mut gps = gps.map(|(receiver, _)| receiver);
     let (rows, _) = open(&chosen)?;
     let stop = ctrl_c()?;
     tell!("Recording into {}, Ctrl-C ends it", arguments.out.display());
@@ -93,9 +90,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 }
 
 /// Opens all rows, and returns which are connected. With several rows, missing ones are reported and tried again.
-///
-/// # Errors
-/// If no row is connected.
+/// Fails if no row is connected.
 pub fn open(chosen: &Chosen) -> Result<(Rows, Vec<bool>)> {
     let (rows, missing) = Rows::open(chosen.openers());
     let are_there = missing.iter().map(Option::is_none).collect();
@@ -136,10 +131,7 @@ impl Log {
 }
 
 impl Logs {
-    /// Opens them all, so that their times begin together.
-    ///
-    /// # Errors
-    /// If one cannot be written, or is something else.
+    /// Opens them all, so that their times begin together. Fails if one cannot be written, or is something else.
     pub fn open(out: &Path, chosen: &Chosen) -> Result<Self> {
         if chosen.are_several {
             // An existing log is continued, so no name is checked.
@@ -151,10 +143,7 @@ impl Logs {
         Ok(Self { logs: paths.map(log).collect::<Result<_, LogError>>()? })
     }
 
-    /// Writes an event of a row. After a failure its log is not written again.
-    ///
-    /// # Errors
-    /// At the first failure of a log.
+    /// Writes an event of a row. Fails at the first failure of its log, which is not written again.
     pub fn write(&mut self, row: usize, happening: &Happening) -> Result<(), LogError> {
         self.logs[row].write(|writer| writer.write(happening))
     }
@@ -165,17 +154,11 @@ impl Logs {
     }
 
     /// Writes lines of this time into a row's log, as [`Logs::write`].
-    ///
-    /// # Errors
-    /// At the first failure of a log.
     fn lines_at(&mut self, row: usize, time_ms: u64, lines: &Lines) -> Result<(), LogError> {
         self.logs[row].write(|writer| writer.lines_at(time_ms, lines))
     }
 
-    /// Reports a log that could not be written. The other rows' logs continue.
-    ///
-    /// # Errors
-    /// If no log is left.
+    /// Reports a log that could not be written. The other rows' logs continue. Fails if no log is left.
     fn go_on_after(&self, written: Result<(), LogError>, row: usize, chosen: &Chosen) -> Result<()> {
         if let Err(error) = written {
             tell!("error: {}", chosen.under_name(row, &format!("{:#}", anyhow::Error::from(error))));

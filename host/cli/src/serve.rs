@@ -64,7 +64,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Some(None) => Some(serve::find_lan()?),
         None => None,
     };
-    let chosen = arguments.ports.choose()?;
+    let chosen = arguments.ports.choose(None)?;
     let server = Server::open(Setup {
         machines: chosen.names().into_iter().zip(chosen.openers()).collect(),
         page,

@@ -78,14 +78,14 @@ Example: weeder settings push machine.toml --port /dev/ttyACM0")]
 /// Pulls, pushes or compares.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     match &arguments.action {
-        Action::Pull { file, replace, json, ports } => pull(file.as_ref(), *replace, *json, &ports.choose()?),
-        Action::Push { file, no_save, save: _, json, ports } => push(file, !no_save, *json, &ports.choose()?),
-        Action::Diff { file, json, ports } => diff(file, *json, &ports.choose()?),
+        Action::Pull { file, replace, json, ports } => pull(file.as_ref(), *replace, *json, &ports.choose(None)?),
+        Action::Push { file, no_save, save: _, json, ports } => push(file, !no_save, *json, &ports.choose(None)?),
+        Action::Diff { file, json, ports } => diff(file, *json, &ports.choose(None)?),
     }
 }
 
 fn pull(file: Option<&OutName>, replace: Replace, json: bool, chosen: &Chosen) -> Result<Finding> {
-    let names = chosen.rows.iter().map(|row| Chosen::name_in(row, "toml"));
+    let names = chosen.rows.iter().map(|row| format!("{}.toml", row.name));
     let folder = match file {
         Some(file) if chosen.are_several => Some(file.folder(names, replace)?),
         Some(file) => file.file(replace).map(|_| None)?,
@@ -223,13 +223,13 @@ fn differences(wanted: &Named, found: &Shown) -> Result<Vec<Difference>, Setting
         let own = found.others.iter().find(|other| other.name == name(setting)).map(|other| Value::from(other.value));
         let machine = match found.missing.contains(&setting) {
             true => own.unwrap_or(Value::Null),
-            false => value(setting, found.settings.get(setting)),
+            false => value(setting.is_switched(), found.settings.get(setting)),
         };
-        differences.push((name(setting), value(setting, file), machine, unit(setting)));
+        differences.push((name(setting), value(setting.is_switched(), file), machine, unit(setting)));
     }
     for foreign in &wanted.foreign {
         let own = found.takes(foreign)?;
-        let value = |number: u16| if own.is_switched { Value::from(number != 0) } else { Value::from(number) };
+        let value = |number| value(own.is_switched, number);
         differences.push((own.name.clone(), value(foreign.value), value(own.value), own.unit.clone()));
     }
     differences.retain(|(_, file, machine, _)| file != machine);
@@ -247,14 +247,12 @@ fn table(differences: &[Difference]) -> Table {
 
 fn as_json(shown: &Shown) -> Value {
     let known = Setting::all().filter(|setting| !shown.missing.contains(setting));
-    let known = known.map(|setting| (name(setting), value(setting, shown.settings.get(setting))));
-    let others = shown.others.iter().map(|other| {
-        (other.name.clone(), if other.is_switched { Value::from(other.value != 0) } else { Value::from(other.value) })
-    });
+    let known = known.map(|setting| (name(setting), value(setting.is_switched(), shown.settings.get(setting))));
+    let others = shown.others.iter().map(|other| (other.name.clone(), value(other.is_switched, other.value)));
     known.chain(others).collect()
 }
 
 /// A setting's value in JSON, as in the file.
-fn value(setting: Setting, number: u16) -> Value {
-    settings_file::is_true(setting, number).map_or_else(|| Value::from(number), Value::from)
+fn value(is_switched: bool, number: u16) -> Value {
+    if is_switched { Value::from(number != 0) } else { Value::from(number) }
 }

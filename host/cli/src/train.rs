@@ -113,10 +113,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let is_rust = table.as_ref().is_some_and(|table| is_rust(table.path()));
     write_if_asked(table.as_ref(), "Table", arguments.json, |to| match is_rust {
         true => Ok(to.write_all(listing::rust(&training, &arguments.command()).as_bytes())?),
-        false => listing::write_csv(&training.kept, to),
+        false => Ok(listing::write_csv(&training.kept, to)?),
     })?;
     write_if_asked(picture.as_ref(), "Picture", arguments.json, |to| {
-        svg::write(to, &regions::draw(&training, &objects))
+        Ok(svg::write(to, &regions::draw(&training, &objects))?)
     })?;
     printed
 }
@@ -174,7 +174,7 @@ fn beside(arguments: &Arguments, table: Option<&OutFile>, objects: &[Labelled]) 
             chosen.len()
         ),
     };
-    write_if_asked(table, "Table", arguments.json, |to| listing::write_csv(&chosen, to))?;
+    write_if_asked(table, "Table", arguments.json, |to| Ok(listing::write_csv(&chosen, to)?))?;
     printed
 }
 

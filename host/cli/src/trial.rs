@@ -125,13 +125,10 @@ enum Baseline {
 impl Arguments {
     /// The firmware and its baselines, in the order in which they are shown.
     fn controllers(&self) -> Vec<Treatment> {
-        let takes_part = |controller: &Treatment| match controller {
-            Treatment::Firmware => true,
-            Treatment::WithoutLookAhead => self.baselines.contains(&Baseline::Queue),
-            Treatment::Paper => self.baselines.contains(&Baseline::Paper),
-            Treatment::Ideal => self.baselines.contains(&Baseline::Ideal),
-        };
-        Treatment::ALL.into_iter().filter(takes_part).collect()
+        let baselines = [Baseline::Queue, Baseline::Paper, Baseline::Ideal].into_iter();
+        let all = baselines.zip([Treatment::WithoutLookAhead, Treatment::Paper, Treatment::Ideal]);
+        let asked = all.filter(|(name, _)| self.baselines.contains(name)).map(|(_, controller)| controller);
+        [Treatment::Firmware].into_iter().chain(asked).collect()
     }
 
     /// The command that gives the same result: its options that differ from the defaults, in a fixed order.
@@ -341,9 +338,9 @@ fn write_report(
     };
     let html = page.html()?;
     let [report, plots, controllers] = REPORT;
-    folder.write(report, |to| to.write_all(html.as_bytes()))?;
-    folder.write(plots, |to| experiment::write_csv(outcomes, &[Treatment::Firmware], to))?;
-    folder.write(controllers, |to| experiment::write_csv(outcomes, &experiment.controllers, to))
+    folder.write(report, |to| Ok(to.write_all(html.as_bytes())?))?;
+    folder.write(plots, |to| Ok(experiment::write_csv(outcomes, &[Treatment::Firmware], to)?))?;
+    folder.write(controllers, |to| Ok(experiment::write_csv(outcomes, &experiment.controllers, to)?))
 }
 
 fn in_json(outcome: &PlotOutcome) -> Value {

@@ -9,7 +9,6 @@ use field::machine::Machine;
 use field::motion::mm_s;
 use frame::{CourseArguments, number_within, say, tell, whole_within};
 use gps::simulated::{ReceiverSetup, SimulatedReceiver, Trouble};
-use std::io;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver};
@@ -187,19 +186,18 @@ const RUN_MM: RangeInclusive<u16> = 1000..=60_000;
 /// The runs that are typed into this terminal.
 fn typed_runs() -> Receiver<Run> {
     let (asked, runs) = mpsc::channel();
-    // Reading blocks until a person types, so it has its own thread. The thread ends with the process.
     thread::spawn(move || {
-        input::read(io::stdin().lock(), |line| {
+        for line in input::typed() {
             let run = match line.text.trim() {
                 "" => Some(Run::AlongRow),
                 typed => typed.parse().ok().filter(|mm| RUN_MM.contains(mm)).map(|mm| Run::OverGround(mm.into())),
             };
-            let Some(run) = run else {
-                tell!("error: type Enter, or millimetres from {} to {}", RUN_MM.start(), RUN_MM.end());
-                return true;
-            };
-            asked.send(run).is_ok()
-        });
+            match run.map(|run| asked.send(run)) {
+                Some(Ok(())) => {}
+                Some(Err(_)) => return,
+                None => tell!("error: type Enter, or millimetres from {} to {}", RUN_MM.start(), RUN_MM.end()),
+            }
+        }
     });
     runs
 }

@@ -10,12 +10,12 @@
 //! that names an output.
 
 use crate::say;
-use anyhow::{Context, Error, Result, bail, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use files::whole_file;
 use std::ffi::OsString;
 use std::fs;
-use std::io::{self, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Endings of files that commands write. A folder's name hardly ends so.
@@ -107,11 +107,8 @@ impl OutFile {
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn write<E>(&self, contents: impl FnOnce(&mut dyn Write) -> Result<(), E>) -> Result<()>
-    where
-        E: From<io::Error> + Into<Error>,
-    {
-        whole_file::write(&self.0, contents).map_err(|error| error.into().context(cannot_be_written(&self.0)))
+    pub fn write(&self, contents: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
+        whole_file::write(&self.0, contents).with_context(|| cannot_be_written(&self.0))
     }
 
     /// The name.
@@ -133,10 +130,7 @@ impl OutFolder {
     ///
     /// # Errors
     /// If folder or file cannot be written, or this name was not checked.
-    pub fn write<E>(&self, name: &str, contents: impl FnOnce(&mut dyn Write) -> Result<(), E>) -> Result<()>
-    where
-        E: From<io::Error> + Into<Error>,
-    {
+    pub fn write(&self, name: &str, contents: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
         ensure!(self.names.iter().any(|checked| checked == name), "{name} was not checked before it was written");
         self.make()?;
         OutFile(self.folder.join(name)).write(contents)
@@ -152,15 +146,12 @@ impl OutFolder {
 ///
 /// # Errors
 /// If it cannot be written, or its name not be printed.
-pub fn write_if_asked<E>(
+pub fn write_if_asked(
     file: Option<&OutFile>,
     title: &str,
     json: bool,
-    contents: impl FnOnce(&mut dyn Write) -> Result<(), E>,
-) -> Result<()>
-where
-    E: From<io::Error> + Into<Error>,
-{
+    contents: impl FnOnce(&mut dyn Write) -> Result<()>,
+) -> Result<()> {
     let Some(file) = file else { return Ok(()) };
     file.write(contents)?;
     if json { Ok(()) } else { say!("{title:<12}{}", file.path().display()) }

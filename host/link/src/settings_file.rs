@@ -47,11 +47,6 @@ pub fn write(path: &Path, shown: &Shown) -> Result<(), FileError> {
     written.map_err(|source| FileError::unwritten(path, source))
 }
 
-/// A switch as TOML and JSON write it: true or false. `None` for other settings.
-pub fn is_true(setting: Setting, value: u16) -> Option<bool> {
-    setting.is_switched().then_some(value != 0)
-}
-
 /// An error in the line where a text is no TOML.
 pub(super) fn no_toml(path: &Path, text: &str, error: &TomlError) -> FileError {
     let start = error.span().map_or(0, |span| span.start);

@@ -28,6 +28,12 @@ pub enum Connection {
     Down(String),
 }
 
+impl Default for Connection {
+    fn default() -> Self {
+        Self::Down("looking for it".to_owned())
+    }
+}
+
 /// An object that the beam has seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Seen {
@@ -58,7 +64,7 @@ pub enum Answer {
 }
 
 /// The state of a row.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct RowModel {
     /// The operator's name for it.
     pub name: String,
@@ -107,7 +113,8 @@ pub struct Model {
 impl Model {
     /// Rows in unknown state.
     pub fn new(names: Vec<String>) -> Self {
-        Self { rows: names.into_iter().map(RowModel::new).collect(), ..Self::default() }
+        let row = |name| RowModel { name, ..RowModel::default() };
+        Self { rows: names.into_iter().map(row).collect(), ..Self::default() }
     }
 
     /// Goes on to a time: a status that is too old is no longer the present one.
@@ -242,27 +249,6 @@ impl Model {
 }
 
 impl RowModel {
-    /// A row in unknown state.
-    fn new(name: String) -> Self {
-        Self {
-            name,
-            connection: Connection::Down("looking for it".to_owned()),
-            status: None,
-            is_known: false,
-            status_at: None,
-            restarted: None,
-            settings: Settings::new(),
-            objects: VecDeque::new(),
-            zones: VecDeque::new(),
-            advice: None,
-            answer: Answer::None,
-            set_up: SetUp::default(),
-            step: None,
-            heading: Heading::default(),
-            warning: None,
-        }
-    }
-
     /// The warning about the margin, if it has changed.
     fn take_warning(&mut self) -> Option<String> {
         let warning = self.set_up.warning(&self.settings);

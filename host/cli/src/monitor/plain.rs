@@ -20,8 +20,7 @@ use link::session::Happening;
 use link::settings::other_version;
 use std::collections::VecDeque;
 use std::io::{self, ErrorKind, Write};
-use std::sync::mpsc::{self, Receiver, TryRecvError};
-use std::thread;
+use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::{Duration, Instant};
 
 /// Lines that are read ahead. The others wait in the pipe.
@@ -39,10 +38,7 @@ const STALLED: Duration = Duration::from_millis(500);
 /// # Errors
 /// If a line was not sent, an Uno goes away with commands unanswered, or output or log fail.
 pub fn run(rows: &Rows, are_there: &[bool], chosen: &Chosen, logs: Option<Logs>) -> Result<Finding> {
-    let (sender, commands) = mpsc::sync_channel(0);
-    // Reading blocks until the operator types, so it has its own thread. The thread ends with the process.
-    thread::spawn(move || input::read(io::stdin().lock(), |line| sender.send(line).is_ok()));
-    match Talk::new(rows, are_there, chosen, logs).run(&commands, &mut io::stdout().lock()) {
+    match Talk::new(rows, are_there, chosen, logs).run(&input::typed(), &mut io::stdout().lock()) {
         // The reader has closed the pipe: it has read enough.
         Err(error) if error.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == ErrorKind::BrokenPipe) => {
             Ok(Finding::Good)
@@ -269,6 +265,7 @@ mod tests {
     use link::row_names::{Board, Row};
     use link::{LinkError, Wire};
     use rig::ScriptedBoard;
+    use std::sync::mpsc;
 
     #[test]
     fn a_hold_goes_before_an_answer_that_does_not_come() {

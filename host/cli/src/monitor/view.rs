@@ -46,7 +46,7 @@ const fn bold(colour: Color) -> Style {
 }
 
 /// The colour of a state.
-fn colour(mode: Mode) -> Color {
+const fn colour(mode: Mode) -> Color {
     match mode {
         Mode::Hold => Color::Yellow,
         Mode::Work => Color::Green,
