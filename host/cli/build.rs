@@ -7,9 +7,6 @@ use std::env;
 use std::path::Path;
 use std::process::Command;
 
-/// Length of a commit's name.
-const DIGITS: &str = "--short=7";
-
 fn main() {
     println!("cargo::rerun-if-env-changed=WEEDER_COMMIT");
     let commit = env::var("WEEDER_COMMIT").ok().or_else(commit_of_the_clone).filter(|commit| !commit.is_empty());
@@ -32,9 +29,7 @@ fn commit_of_the_clone() -> Option<String> {
     for file in git(&["-C", &root, "ls-files"])?.lines() {
         println!("cargo::rerun-if-changed={root}/{file}");
     }
-    let commit = git(&["rev-parse", DIGITS, "HEAD"])?;
-    let changed = git(&["status", "--porcelain", "--untracked-files=no"])?;
-    Some(if changed.is_empty() { commit } else { commit + "+" })
+    git(&["describe", "--always", "--exclude=*", "--abbrev=7", "--dirty=+"])
 }
 
 /// git's output, if it succeeds.

@@ -133,10 +133,7 @@ fn on_machine(port: &Port) -> Result<Vec<Taught>> {
     Ok(examples::read(&mut port.open()?)?.into_iter().map(|(_, example)| example).collect())
 }
 
-/// A table's examples, each once; at least one.
-///
-/// # Errors
-/// If it is no such table.
+/// A table's examples, each once; at least one. Fails if it is no such table.
 pub fn in_table(file: &Path) -> Result<Vec<Taught>> {
     let objects = table::read(file)?;
     let mut examples = Vec::new();

@@ -137,10 +137,8 @@ pub struct Chosen {
 }
 
 impl Ports {
-    /// The chosen rows. A device at the port `beside`, such as a receiver, is none.
-    ///
-    /// # Errors
-    /// If there is no row, two have a name, or the file of the names cannot be read.
+    /// The chosen rows. A device at the port `beside`, such as a receiver, is none. Fails if there is no row, two have
+    /// a name, or the file of the names cannot be read.
     pub fn choose(&self, beside: Option<&str>) -> Result<Chosen> {
         let rows = if self.all {
             every_row(&self.names.read()?, beside)?
@@ -217,10 +215,8 @@ impl Chosen {
         })
     }
 
-    /// Prints the failures of the rows' results, with their names.
-    ///
-    /// # Errors
-    /// If a row failed: the only row's own error, or the names of the failed rows.
+    /// Prints the failures of the rows' results, with their names. Fails if a row failed: the only row's own error, or
+    /// the names of the failed rows.
     pub fn check<T>(&self, mut done: Vec<Result<T>>) -> Result<()> {
         if let (false, [_]) = (self.are_several, done.as_slice()) {
             return done.remove(0).map(drop);

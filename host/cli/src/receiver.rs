@@ -79,10 +79,8 @@ impl GpsArguments {
         self.gps.as_ref().map(|gps| gps.port.as_str())
     }
 
-    /// The receiver, if the user named one, and the first lines of the record.
-    ///
-    /// # Errors
-    /// If its row is not recorded, or its port cannot be opened now. A later loss of the port is no error.
+    /// The receiver, if the user named one, and the first lines of the record. Fails if its row is not recorded, or its
+    /// port cannot be opened now. A later loss of the port is no error.
     pub fn open(&self, chosen: &Chosen) -> Result<Option<(Gps, Lines)>> {
         let antenna = self.antenna.over(Antenna::default());
         let Some(Named { name, port }) = &self.gps else {

@@ -173,11 +173,9 @@ impl Chosen {
         }
     }
 
-    /// Prints the rows' results, each in words, or all in JSON: the only row's value, or each row's by its name. A failed
-    /// row has `null`, but if the only row has failed, there is only its error.
-    ///
-    /// # Errors
-    /// If a row failed, or the results cannot be printed.
+    /// Prints the rows' results, each in words, or all in JSON: the only row's value, or each row's by its name. A
+    /// failed row has `null`, but if the only row has failed, there is only its error. Fails if a row failed, or the
+    /// results cannot be printed.
     fn show<T>(
         &self,
         done: Vec<Result<T>>,

@@ -46,7 +46,9 @@ fn long_help() -> String {
     let mut table = Table::new();
     table.set_content_arrangement(ContentArrangement::Dynamic).set_width(HELP_WIDTH);
     table.load_style(presets::NOTHING).add_rows(axes());
-    table.column_iter_mut().for_each(|column| drop(column.set_padding((2, 0))));
+    for column in table.column_iter_mut() {
+        column.set_padding((2, 0));
+    }
     format!("{EXAMPLES}\n\nWhat an axis can be:\n{}\n", table.trim_fmt())
 }
 
@@ -190,11 +192,9 @@ fn in_words(result: &str, sweep: &Sweep, points: &[Point]) -> String {
 
 /// The field, seed, speed, spacing and controller of a sweep.
 fn about(sweep: &Sweep) -> String {
-    let axes = [Some(&sweep.x), sweep.y.as_ref()].into_iter().flatten();
-    let swept: Vec<&str> = axes.map(|axis| axis.parameter.as_str()).collect();
     let mut text = format!("Field {}, seed {}", sweep.field, sweep.seed);
     for (name, value, unit) in [("speed", sweep.speed_km_h, "km/h"), ("spacing", sweep.spacing_cm, "cm")] {
-        if !swept.contains(&name) {
+        if !columns(sweep).any(|column| column == name) {
             let _ = write!(text, ", {value} {unit}");
         }
     }

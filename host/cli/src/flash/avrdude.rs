@@ -33,10 +33,7 @@ const GET_IT: &str = if cfg!(windows) {
 const WHOLE: &str = "The bootloader is not changed";
 
 /// Writes and verifies an Intel HEX file. Returns whether avrdude succeeded, and the chip's signature, if avrdude has
-/// printed it.
-///
-/// # Errors
-/// If avrdude is not installed, falls silent, or loses the port.
+/// printed it. Fails if avrdude is not installed, falls silent, or loses the port.
 pub fn write(image: &Path, port: &str, baud: u32) -> Result<(bool, Option<Signature>)> {
     // A link may stay when its port goes. On Windows a port is no file.
     let device: Option<PathBuf> = if cfg!(windows) { None } else { fs::canonicalize(port).ok() };

@@ -185,49 +185,42 @@ impl Model {
 
     /// Updates a row by an event.
     pub fn update(&mut self, number: usize, happening: Happening) {
+        use EventLine::{Alarm, Newer, Plot, State, Warning};
         // Plants and swings of several rows are too many lines to read.
-        let said = match &happening {
-            Happening::Connected { version, .. } => Some(format!("-- connected to weeder {version}")),
-            Happening::Lost(why) => Some(format!("-- {why}")),
-            Happening::Started { while_at_work: Some(cause), .. } => Some(format!("-- {}", advice::restarted(cause))),
-            Happening::Event(EventLine::Plot, _) => None,
-            Happening::Event(
-                EventLine::Alarm { .. } | EventLine::Warning { .. } | EventLine::State { .. } | EventLine::Newer { .. },
-                line,
-            ) => Some(line.clone()),
-            Happening::Event(_, line) => (!self.are_several()).then(|| line.clone()),
-            Happening::Command(line) => (!self.are_several()).then(|| format!("> {line}")),
-            Happening::Answer(line) => Some(line.clone()),
-            _ => None,
-        };
-        if let Happening::Answer(line) = &happening
-            && let Some(head) = self.rows[number].heading.before(line)
-        {
-            self.say_of(number, &format!("-- {head}"));
-        }
-        if let Some(said) = said {
-            self.say_of(number, &said);
-        }
-        if let Happening::Connected { version, shown, .. } = &happening
-            && let Some(other) = settings::other_version(version, shown)
-        {
-            self.say_of(number, &format!("-- {other}"));
-        }
+        let is_alone = !self.are_several();
         let row = &mut self.rows[number];
+        let mut said = Vec::new();
+        match &happening {
+            Happening::Connected { version, shown, .. } => {
+                said.push(format!("-- connected to weeder {version}"));
+                said.extend(settings::other_version(version, shown).map(|other| format!("-- {other}")));
+            }
+            Happening::Lost(why) => said.push(format!("-- {why}")),
+            Happening::Started { while_at_work: Some(cause), .. } => {
+                said.push(format!("-- {}", advice::restarted(cause)));
+            }
+            Happening::Event(Plot, _) => {}
+            Happening::Event(Alarm { .. } | Warning { .. } | State { .. } | Newer { .. }, line) => {
+                said.push(line.clone());
+            }
+            Happening::Event(_, line) if is_alone => said.push(line.clone()),
+            Happening::Command(line) if is_alone => said.push(format!("> {line}")),
+            Happening::Answer(line) => {
+                said.extend(row.heading.before(line).map(|head| format!("-- {head}")));
+                said.push(line.clone());
+            }
+            _ => {}
+        }
         self.rings |= match &happening {
-            Happening::Event(EventLine::Alarm { .. } | EventLine::Newer { is_alarm: true }, _)
+            Happening::Event(Alarm { .. } | Newer { is_alarm: true }, _)
             | Happening::Started { while_at_work: Some(_), .. } => true,
             Happening::Lost(_) => row.is_there(),
             _ => false,
         };
         row.update(happening);
-        let (step, warning) = (row.take_step(), row.take_warning());
-        if let Some(step) = step {
-            self.say_of(number, &format!("-- next, {step}"));
-        }
-        if let Some(warning) = warning {
-            self.say_of(number, &format!("-- warning: {warning}"));
-        }
+        said.extend(row.take_step().map(|step| format!("-- next, {step}")));
+        said.extend(row.take_warning().map(|warning| format!("-- warning: {warning}")));
+        said.iter().for_each(|line| self.say_of(number, line));
     }
 
     /// Adds a line to the console.

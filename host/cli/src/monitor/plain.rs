@@ -33,10 +33,8 @@ const LOOK: Duration = Duration::from_millis(20);
 const STALLED: Duration = Duration::from_millis(500);
 
 /// Goes on until the input has ended and its last command has been answered; bad where one was refused. `are_there`
-/// says which rows were there when they were opened.
-///
-/// # Errors
-/// If a line was not sent, an Uno goes away with commands unanswered, or output or log fail.
+/// says which rows were there when they were opened. Fails if a line was not sent, an Uno goes away with commands
+/// unanswered, or output or log fail.
 pub fn run(rows: &Rows, are_there: &[bool], chosen: &Chosen, logs: Option<Logs>) -> Result<Finding> {
     match Talk::new(rows, are_there, chosen, logs).run(&input::typed(), &mut io::stdout().lock()) {
         // The reader has closed the pipe: it has read enough.

@@ -13,10 +13,7 @@ use std::time::{Duration, Instant};
 /// Time between two reads of the keyboard. After each, the screen is drawn again.
 const TURN: Duration = Duration::from_millis(20);
 
-/// Watches until Ctrl-C or Ctrl-D.
-///
-/// # Errors
-/// If the terminal or a log fails.
+/// Watches until Ctrl-C or Ctrl-D. Fails if the terminal or a log fails.
 pub fn run(rows: &Rows, names: Vec<String>, mut logs: Option<Logs>) -> Result<()> {
     let mut terminal = ratatui::try_init().context("the terminal cannot be drawn on: --plain does without")?;
     let result = watch(&mut terminal, rows, Model::new(names), &mut logs);

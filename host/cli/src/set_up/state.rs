@@ -63,10 +63,7 @@ impl State {
         lines.join("\n")
     }
 
-    /// Takes the board that is there.
-    ///
-    /// # Errors
-    /// If the file belongs to a board with another serial number.
+    /// Takes the board that is there. Fails if the file belongs to a board with another serial number.
     pub(super) fn take_board(&mut self, board: &Board, path: &Path) -> Result<()> {
         let named = match board {
             Board::SerialNumber(number) => format!("{NUMBER}{number}"),
