@@ -87,8 +87,7 @@ impl Firmware {
         prove(&elf, &firmware::budgets(self.tester)?)
     }
 
-    /// Proves this firmware's bounds, and says where that fails but is insisted on. Fails if it fails, or a bound is
-    /// over its budget, without `--unproved`.
+    /// Proves this firmware's bounds. Fails if one is not proved, or is over its budget; with `--unproved` this only warns.
     pub fn check(&self, elf: &Path) -> Result<()> {
         let why = match self.prove(elf) {
             Ok(held) => match held.into_iter().find(|held| !held.keeps) {

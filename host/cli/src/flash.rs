@@ -41,18 +41,15 @@ pub struct Arguments {
 
 /// A bootloader: its rate in bits a second, and the flash that it leaves. It takes the last 512 or 2048 bytes of 32 KiB.
 #[derive(Clone, Copy)]
-struct Bootloader {
+pub struct Bootloader {
     baud: u32,
-    available: usize,
+    pub available: usize,
     /// What the user adds to the command for it.
     option: &'static str,
 }
 
 const OPTIBOOT: Bootloader = Bootloader { baud: 115_200, available: 32_256, option: "without --old-bootloader" };
-const OLD: Bootloader = Bootloader { baud: 57_600, available: OLD_AVAILABLE_BYTES, option: "with --old-bootloader" };
-
-/// Flash for the firmware beside the old bootloader, in bytes.
-pub const OLD_AVAILABLE_BYTES: usize = 30_720;
+pub const OLD: Bootloader = Bootloader { baud: 57_600, available: 30_720, option: "with --old-bootloader" };
 
 /// Flashes, with each of avrdude's own messages once on the terminal.
 pub fn run(arguments: &Arguments) -> Result<()> {

@@ -183,7 +183,7 @@ mod tests {
     use std::collections::BTreeSet;
     use std::ffi::OsString;
     use std::fs;
-    use std::path::{Path, PathBuf};
+    use std::path::PathBuf;
 
     #[test]
     fn the_arguments_are_well_formed() {
@@ -334,14 +334,6 @@ mod tests {
         }
     }
 
-    /// Runs a command in this process, with `DIR` for a folder.
-    fn run_in(folder: &Path, words: &str) -> Result<Finding> {
-        let folder = folder.to_str().expect("it is text");
-        let words = ["weeder"].into_iter().chain(words.split(' '));
-        let words = words.map(|word| OsString::from(word.replace("DIR", folder)));
-        run(parse::<Arguments>(words.collect()).unwrap_or_else(|error| panic!("{error}")).command)
-    }
-
     #[test]
     fn no_command_replaces_an_existing_file_without_force() {
         let folder = tempfile::tempdir().expect("there is room for a folder");
@@ -350,7 +342,11 @@ mod tests {
         fs::write(path("log.csv"), "time_ms,kind,line\n0,connected,0.2.0\n").unwrap();
         let filled = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/trial-example.csv");
         fs::copy(filled, path("filled.csv")).unwrap();
-        let run = |words: &str| run_in(folder.path(), words);
+        let run = |words: &str| {
+            let words = format!("weeder {words}").replace("DIR", folder.path().to_str().expect("it is text"));
+            let words = words.split(' ').map(OsString::from).collect();
+            run(parse::<Arguments>(words).unwrap_or_else(|error| panic!("{error}")).command)
+        };
         let small = "--field DIR/small.toml --shard 1/1 --out";
         run(&format!("trial --speeds 2 --spacings 50 {small} DIR/trial.part")).expect("it computes a part");
         run(&format!("sweep --x k=1..1:1 {small} DIR/sweep.part")).expect("it computes a part");

@@ -93,17 +93,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 /// Fails if no row is connected.
 pub fn open(chosen: &Chosen) -> Result<(Rows, Vec<bool>)> {
     let (rows, missing) = Rows::open(chosen.openers());
-    let are_there = missing.iter().map(Option::is_none).collect();
-    let mut missing: Vec<_> = missing.into_iter().enumerate().filter_map(|(row, why)| Some((row, why?))).collect();
-    if missing.len() < rows.count() {
+    let are_there: Vec<bool> = missing.iter().map(Option::is_none).collect();
+    if are_there.contains(&true) {
         return Ok((rows, are_there));
     }
-    if !chosen.are_several
-        && let Some((_, why)) = missing.pop()
-    {
-        return Err(why.into());
-    }
-    for (row, why) in missing {
+    for (row, why) in missing.into_iter().flatten().enumerate() {
+        if !chosen.are_several {
+            return Err(why.into());
+        }
         tell!("{}", chosen.under_name(row, &format!("{:#}", anyhow::Error::from(why))));
     }
     bail!("none of the {} rows is there", rows.count());

@@ -59,11 +59,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         (None, Some(inside)) => inside,
         (None, None) => Page::read(&firmware::workspace_root().join("page/dist"))?,
     };
-    let lan = match arguments.lan {
-        Some(Some(address)) => Some(address),
-        Some(None) => Some(serve::find_lan()?),
-        None => None,
-    };
+    let lan = arguments.lan.map(|address| address.map_or_else(serve::find_lan, Ok)).transpose()?;
     let chosen = arguments.ports.choose(None)?;
     let server = Server::open(Setup {
         machines: chosen.names().into_iter().zip(chosen.openers()).collect(),

@@ -200,13 +200,9 @@ impl Guide {
         if let Some(warning) = self.state.measured.warning(&settings) {
             say!("  Warning: {warning}")?;
         }
-        match self.tool_width_mm() {
-            Some(width_mm) => match simulated::expected(&settings, width_mm) {
-                Ok(expected) => say!("  Expected: {expected}")?,
-                Err(error) => say!("  Expected: not calculated, because {error:#}")?,
-            },
-            None => say!("  Expected: not calculated, because the tool's width was not given in step 3")?,
-        }
+        let width_mm = self.tool_width_mm().context("the tool's width was not given in step 3");
+        let expected = width_mm.and_then(|width_mm| simulated::expected(&settings, width_mm));
+        say!("  Expected: {}", expected.unwrap_or_else(|error| format!("not calculated, because {error:#}")))?;
         say!("  The measurements are in {}.", self.path.display())?;
         say!("  Next, read docs/work.md (in a release: manual/docs/work.md).")
     }

@@ -204,7 +204,7 @@ fn typed_runs() -> Receiver<Run> {
 
 /// The next command to type. An Uno with only a bootloader needs a firmware.
 fn next_command(ports: &[&Path], bootloader: Option<&Bootloader>) -> Result<String> {
-    let is_old = |bootloader: &Bootloader| usize::from(bootloader.start()) == flash::OLD_AVAILABLE_BYTES;
+    let is_old = |bootloader: &Bootloader| usize::from(bootloader.start()) == flash::OLD.available;
     let (begin, ports): (&[&str], _) = match bootloader {
         None => (&["weeder", "monitor"], ports),
         // One at a time.

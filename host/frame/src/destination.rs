@@ -65,9 +65,6 @@ impl From<OsString> for OutName {
 
 impl OutName {
     /// Checks that a file of this name can be written without losing a file.
-    ///
-    /// # Errors
-    /// If it could not, and why.
     pub fn file(&self, replace: Replace) -> Result<OutFile> {
         ensure!(!self.0.is_dir(), "{} is a folder: name a file", self.0.display());
         replace.check(&self.0)?;
@@ -76,9 +73,6 @@ impl OutName {
     }
 
     /// Checks that files of these names can be written into a folder of this name without losing a file.
-    ///
-    /// # Errors
-    /// If they could not, and why.
     pub fn folder<N: Into<String>>(&self, names: impl IntoIterator<Item = N>, replace: Replace) -> Result<OutFolder> {
         let folder = &self.0;
         ensure!(!folder.exists() || folder.is_dir(), "{} is a file: name a folder", folder.display());
@@ -104,9 +98,6 @@ impl OutName {
 
 impl OutFile {
     /// Writes it whole, or leaves what was there.
-    ///
-    /// # Errors
-    /// If it cannot be written.
     pub fn write(&self, contents: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
         whole_file::write(&self.0, contents).with_context(|| cannot_be_written(&self.0))
     }
@@ -119,17 +110,11 @@ impl OutFile {
 
 impl OutFolder {
     /// Makes the folder if necessary.
-    ///
-    /// # Errors
-    /// If it cannot be made.
     pub fn make(&self) -> Result<()> {
         fs::create_dir_all(&self.folder).with_context(|| format!("the folder {} cannot be made", self.folder.display()))
     }
 
-    /// Writes a whole file there, or leaves the old file. Makes the folder if necessary.
-    ///
-    /// # Errors
-    /// If folder or file cannot be written, or this name was not checked.
+    /// Writes a whole file there, or leaves the old file. Makes the folder if necessary. The name has to be a checked one.
     pub fn write(&self, name: &str, contents: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
         ensure!(self.names.iter().any(|checked| checked == name), "{name} was not checked before it was written");
         self.make()?;
@@ -143,9 +128,6 @@ impl OutFolder {
 }
 
 /// Writes a file that the user asked for, and prints its name behind a title, unless the output is JSON.
-///
-/// # Errors
-/// If it cannot be written, or its name not be printed.
 pub fn write_if_asked(
     file: Option<&OutFile>,
     title: &str,

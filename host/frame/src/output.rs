@@ -41,10 +41,8 @@ pub fn tell_line(line: Arguments) {
     let _ = writeln!(io::stderr(), "{}", in_a_line(&line.to_string()));
 }
 
-/// The command as it was typed, for a report that says how to make it again.
-///
-/// # Errors
-/// If a word cannot be quoted for a shell.
+/// The command as it was typed, for a report that says how to make it again. Fails if a word cannot be quoted for a
+/// shell.
 pub fn command_line() -> Result<String> {
     let words: Vec<String> = ["weeder".to_owned()].into_iter().chain(env::args().skip(1)).collect();
     Ok(shlex::try_join(words.iter().map(String::as_str))?)

@@ -70,10 +70,7 @@ pub struct Arguments {
 /// The files of a report.
 const REPORT: [&str; 5] = ["row.svg", "weeding.svg", "row.csv", "plants.csv", "weeds.csv"];
 
-/// Runs it and prints the result.
-///
-/// # Errors
-/// If an argument or a file is wrong, or the firmware cannot be run.
+/// Runs it and prints the result. Fails if an argument or a file is wrong, or the firmware cannot be run.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let replace = arguments.replace;
     let folder = arguments.out.as_ref().map(|out| out.folder(REPORT, replace)).transpose()?;

@@ -35,10 +35,7 @@ fn named(name: OsString) -> Result<OsString, String> {
     }
 }
 
-/// The conditions of a field. Prints what is likely wrong with them.
-///
-/// # Errors
-/// If it is neither a preset nor a valid file.
+/// The conditions of a field. Prints what is likely wrong with them. Fails if it is neither a preset nor a valid file.
 pub fn field(preset_or_file: &str) -> Result<Conditions, FileError> {
     let conditions = Conditions::load(preset_or_file)?;
     conditions.warnings().iter().for_each(|warning| tell!("Warning: {warning}"));

@@ -267,11 +267,6 @@ impl RowModel {
         self.status.as_ref().filter(|_| self.is_known)
     }
 
-    /// The last known mode.
-    fn mode(&self) -> Option<Mode> {
-        self.status.as_ref().map(|status| status.mode)
-    }
-
     /// What the operator must notice: a restart at work, and the advice for an alarm or a warning.
     pub fn advice(&self) -> Option<String> {
         let parts: Vec<&str> = [&self.restarted, &self.advice].into_iter().flatten().map(String::as_str).collect();
@@ -324,7 +319,7 @@ impl RowModel {
     fn take_status(&mut self, status: Status) {
         if let Some(alarm) = status.alarm {
             self.advice = Some(format!("alarm {}: {}", advice::name(alarm), advice::alarm(alarm)));
-        } else if self.mode() == Some(Mode::Alarm) {
+        } else if self.status.as_ref().is_some_and(|last| last.mode == Mode::Alarm) {
             self.advice = None;
         }
         if status.mode == Mode::Work {

@@ -71,11 +71,6 @@ fn column_of(row: &RowModel, columns: usize, ahead_of_tool_mm: f64) -> f64 {
     (ahead_of_tool_mm + 0.25 * beam_to_tool) / mm_per_column
 }
 
-/// The tool's column.
-fn tool_column(row: &RowModel, columns: usize) -> usize {
-    column_of(row, columns, 0.0).round() as usize
-}
-
 /// The ground from a little behind the tool to the beam. The machine rolls to the right.
 fn ground(row: &RowModel, columns: usize) -> String {
     let beam_to_tool = f64::from(row.settings.get(Setting::BeamToToolMm));
@@ -101,16 +96,13 @@ fn ground(row: &RowModel, columns: usize) -> String {
             paint(from, to, Ground::Canopy);
         }
     }
-    ground.iter().map(symbol).collect()
-}
-
-fn symbol(ground: &Ground) -> char {
-    match ground {
+    let symbol = |ground| match ground {
         Ground::Bare => '_',
         Ground::Weed => '\'',
         Ground::Margin => '░',
         Ground::Canopy => '█',
-    }
+    };
+    ground.into_iter().map(symbol).collect()
 }
 
 /// The part of the console's output that is shown, as many lines as there is room for.

@@ -6,7 +6,8 @@ use super::{URGENT, bold, colour, draw_line, draw_said, draw_top, ground, shown_
 use crate::monitor::model::{Answer, Connection, Model, RowModel};
 use link::{Mode, advice};
 use ratatui::Frame;
-use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::layout::Constraint::{Length, Min};
+use ratatui::layout::{Layout, Rect};
 use ratatui::style::{Style, Stylize};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
@@ -26,16 +27,11 @@ pub fn draw(model: &Model, rows: &[RowModel], frame: &mut Frame) {
     // the advice.
     let others = if is_roomy { 3 + 3 + 1 } else { 3 };
     let room = usize::from(area.height.saturating_sub(others)).min(rows.len());
-    let [top, list, advice, said, line, hint] = Layout::vertical([
-        Constraint::Length(1),
-        Constraint::Length(room as u16),
-        Constraint::Length(u16::from(is_roomy)),
-        Constraint::Min(0),
-        Constraint::Length(1),
-        Constraint::Length(1),
-    ])
-    .areas(area);
-    draw_top(counted(rows), frame, top);
+    let [top, list, advice, said, line, hint] =
+        Layout::vertical([Length(1), Length(room as u16), Length(u16::from(is_roomy)), Min(0), Length(1), Length(1)])
+            .areas(area);
+    let counted = [vec![Span::raw(format!("{} rows: ", rows.len()))], counts(rows.iter())].concat();
+    draw_top(counted.into(), frame, top);
     draw_list(model, rows, frame, list);
     if let Some((row, text)) = rows.iter().find_map(|row| Some((row, row.advice()?))) {
         frame.render_widget(Line::styled(format!("{}: {text}", row.name), URGENT), advice);
@@ -75,10 +71,6 @@ fn counts<'a>(rows: impl Iterator<Item = &'a RowModel> + Clone) -> Vec<Span<'sta
     let counts = [LOST, UNKNOWN, ALARM, WORK, HOLD].map(|state| (state, count(state)));
     let counts = counts.into_iter().filter(|&(_, count)| count > 0);
     counts.map(|((name, style), count)| Span::styled(format!("{count} {name} "), style)).collect()
-}
-
-fn counted(rows: &[RowModel]) -> Line<'static> {
-    Line::from([vec![Span::raw(format!("{} rows: ", rows.len()))], counts(rows.iter())].concat())
 }
 
 fn draw_list(model: &Model, rows: &[RowModel], frame: &mut Frame, area: Rect) {
