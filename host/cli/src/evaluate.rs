@@ -10,7 +10,6 @@ use study::evaluation::field_log::{self, OfLog};
 use study::evaluation::{self, Analysis, ResponseAnalysis};
 use study::page::Page;
 
-/// The report's name in its folder.
 const REPORT: &str = "report.html";
 
 #[derive(Args)]

@@ -168,7 +168,6 @@ fn row(machine: &Named, names: &NamesFile) -> Result<Row> {
     Ok(Row { name, board })
 }
 
-/// The last part of a port's path.
 fn end_of(port: &str) -> String {
     Path::new(port).file_name().unwrap_or_default().to_string_lossy().into_owned()
 }

@@ -125,7 +125,6 @@ fn lines(names: &Names, unos: &[Plugged], exists: impl Fn(&str) -> bool) -> Vec<
     .collect()
 }
 
-/// A board's identification, in words.
 fn described(board: &Board) -> String {
     match board {
         Board::Only { .. } => "the only Uno".to_owned(),

@@ -14,7 +14,6 @@ use std::process::{Command, Stdio};
 use std::sync::Arc;
 use uno_run::firmware;
 
-/// The default TCP port.
 const HTTP_PORT: u16 = 8866;
 
 #[derive(Args)]
@@ -82,7 +81,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// Opens an address in the user's browser.
 fn open_in_browser(address: &str) {
     let mut words = match env::consts::OS {
         "macos" => vec!["open"],

@@ -106,7 +106,6 @@ impl fmt::Display for End {
     }
 }
 
-/// Leads the user through the steps.
 struct Guide {
     link: Link,
     state: State,

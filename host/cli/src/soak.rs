@@ -148,7 +148,6 @@ type Title = (&'static str, &'static str);
 const DECISIONS: Title = ("decisions", "The decision core on the host");
 const FIRMWARE: Title = ("firmware", "The firmware on the virtual Uno");
 
-/// A stage of a soak, and its result.
 struct Stage {
     title: Title,
     tally: Tally,

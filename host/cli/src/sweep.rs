@@ -24,10 +24,8 @@ use uno_run::report::number_table;
 /// The name of the command in its parts.
 pub const COMMAND: &str = "sweep";
 
-/// The default result.
 const RESULT: &str = RESULTS[0];
 
-/// The examples in the help.
 const EXAMPLES: &str = "\
 Examples:
   weeder sweep --x lead_out_ms=0..300:20 --y speed=1..4:0.5
@@ -38,7 +36,6 @@ Examples:
   weeder sweep --x k=1..9:2 --shard 2/4 --out 2.part      the second of four parts, for `weeder merge`
 An axis is `speed` in km/h, `spacing` in cm, a parameter of the field as in its TOML file, or a setting of the firmware.";
 
-/// Columns of the help.
 const HELP_WIDTH: u16 = 100;
 
 /// The examples, and all possible axes.
@@ -74,7 +71,6 @@ fn axis() -> impl TypedValueParser<Value = Axis> {
     offering(|| NAMES.iter().map(String::as_str).collect(), |text: &str| text.parse::<Axis>())
 }
 
-/// A controller by its name.
 fn controller() -> impl TypedValueParser<Value = Treatment> {
     let ideal = PossibleValue::new("ideal").alias("all-knowing");
     let names = ["firmware", "without-look-ahead", "paper"].map(PossibleValue::new);
@@ -241,7 +237,6 @@ fn grid(sweep: &Sweep, y: &Axis, points: &[Point], result: &str) -> Table {
     table
 }
 
-/// The unit of a result.
 fn unit_of(result: &str) -> &'static str {
     if result == "performance_index" { "ha %²/(h hp)" } else { "%" }
 }

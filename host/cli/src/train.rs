@@ -74,7 +74,6 @@ fn crop() -> impl TypedValueParser<Value = &'static Crop> {
     offering(|| CROPS.iter().map(|crop| crop.name).collect(), find_crop)
 }
 
-/// A crop by its name.
 fn find_crop(name: &str) -> Result<&'static Crop, String> {
     CROPS.iter().find(|crop| crop.name == name).ok_or_else(|| {
         let names: Vec<&str> = CROPS.iter().map(|crop| crop.name).collect();

@@ -191,7 +191,6 @@ pub struct PlotPart {
     picture: Option<String>,
 }
 
-/// The files of a report.
 const REPORT: [&str; 3] = ["report.html", "trial.csv", "controllers.csv"];
 
 /// Runs it and prints the result, or writes a part of it.

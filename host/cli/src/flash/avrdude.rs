@@ -20,7 +20,6 @@ const GRACE: Duration = Duration::from_secs(2);
 /// Time between two looks at the port.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// How to get avrdude.
 const GET_IT: &str = if cfg!(windows) {
     "put avrdude.exe and avrdude.conf from https://github.com/avrdudes/avrdude/releases beside weeder.exe"
 } else if cfg!(target_os = "macos") {

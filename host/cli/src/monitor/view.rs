@@ -35,7 +35,6 @@ fn draw_top(left: Line, frame: &mut Frame, area: Rect) {
     frame.render_widget(Line::raw(HOLD_KEY).style(HOLD_STYLE), key);
 }
 
-/// The style of the key for HOLD.
 const HOLD_STYLE: Style = bold(Color::White).bg(Color::Red);
 
 /// The style of an alarm, or of a machine that is not there.
@@ -45,7 +44,6 @@ const fn bold(colour: Color) -> Style {
     Style::new().fg(colour).add_modifier(Modifier::BOLD)
 }
 
-/// The colour of a state.
 const fn colour(mode: Mode) -> Color {
     match mode {
         Mode::Hold => Color::Yellow,
