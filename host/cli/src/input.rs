@@ -45,6 +45,16 @@ impl Encoding {
             _ => (Self::Bytes, 0),
         })
     }
+
+    /// The first character, and the bytes behind it.
+    fn first(self, bytes: &[u8]) -> Option<(u16, &[u8])> {
+        match (self, bytes) {
+            (Self::Bytes, [byte, rest @ ..]) => Some((u16::from(*byte), rest)),
+            (Self::LittleEndian, [low, high, rest @ ..]) => Some((u16::from_le_bytes([*low, *high]), rest)),
+            (Self::BigEndian, [high, low, rest @ ..]) => Some((u16::from_be_bytes([*high, *low]), rest)),
+            _ => None,
+        }
+    }
 }
 
 /// Collects bytes to lines.
@@ -71,20 +81,12 @@ impl Lines {
             self.encoding = Some(encoding);
             self.begun.drain(..mark);
         }
-        let width = match self.encoding {
-            None => return Vec::new(),
-            Some(Encoding::Bytes) => 1,
-            Some(_) => 2,
-        };
+        let Some(encoding) = self.encoding else { return Vec::new() };
         let begun = std::mem::take(&mut self.begun);
-        let (whole, rest) = begun.split_at(begun.len() - begun.len() % width);
-        for character in whole.chunks(width) {
-            let code = match (self.encoding, character) {
-                (Some(Encoding::LittleEndian), &[low, high]) => u16::from_le_bytes([low, high]),
-                (_, &[high, low]) => u16::from_be_bytes([high, low]),
-                (_, bytes) => bytes.first().copied().unwrap_or_default().into(),
-            };
+        let mut rest = begun.as_slice();
+        while let Some((code, behind)) = encoding.first(rest) {
             self.character(code);
+            rest = behind;
         }
         if is_all {
             // A last line without an end is a line too.

@@ -6,7 +6,6 @@ use crate::receiver::GpsArguments;
 use anyhow::{Result, bail, ensure};
 use clap::Args;
 use frame::{OutName, Replace, tell};
-use gps::recorder::Lines;
 use link::advice;
 use link::rows::{Rows, What};
 use link::session::Happening;
@@ -46,7 +45,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let gps = arguments.gps.open(&chosen)?;
     let mut logs = Logs::open(&arguments.out, &chosen)?;
     if let Some((receiver, lines)) = &gps {
-        logs.lines_at(receiver.row, logs.now_ms(receiver.row), lines)?;
+        logs.write(receiver.row, |log| log.lines_at(log.now_ms(), lines))?;
     }
     let mut gps = gps.map(|(receiver, _)| receiver);
     let (rows, _) = open(&chosen)?;
@@ -56,7 +55,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         if let Some(gps) = &mut gps {
             let time_ms = logs.now_ms(gps.row);
             let said = gps.turn(time_ms, Instant::now());
-            let written = logs.lines_at(gps.row, time_ms, &said);
+            let written = logs.write(gps.row, |log| log.lines_at(time_ms, &said));
             logs.go_on_after(written, gps.row, &chosen)?;
             for (_, line) in said.iter().filter(|(kind, _)| kind.is_for_the_operator()) {
                 tell!("Receiver: {line}");
@@ -64,7 +63,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         }
         let Some(heard) = rows.next(LOOK) else { continue };
         let What::Happened(happening) = heard.what else { continue };
-        let written = logs.write(heard.row, &happening);
+        let written = logs.write(heard.row, |log| log.write(&happening));
         logs.go_on_after(written, heard.row, &chosen)?;
         if let Some(gps) = gps.as_mut().filter(|gps| gps.row == heard.row) {
             gps.happened(logs.now_ms(heard.row), &happening);
@@ -107,24 +106,12 @@ pub fn open(chosen: &Chosen) -> Result<(Rows, Vec<bool>)> {
 }
 
 /// A log for each row.
-pub struct Logs {
-    logs: Vec<Log>,
-}
+pub struct Logs(Vec<Log>);
 
 struct Log {
     path: PathBuf,
     writer: LogWriter,
     is_written: bool,
-}
-
-impl Log {
-    /// Writes, unless it has failed before.
-    fn write(&mut self, work: impl FnOnce(&mut LogWriter) -> Result<(), LogError>) -> Result<(), LogError> {
-        if !self.is_written {
-            return Ok(());
-        }
-        work(&mut self.writer).inspect_err(|_| self.is_written = false)
-    }
 }
 
 impl Logs {
@@ -137,36 +124,37 @@ impl Logs {
         let path = |row| if chosen.are_several { Chosen::file_in(out, row, "csv") } else { out.to_owned() };
         let paths = chosen.rows.iter().map(path);
         let log = |path: PathBuf| Ok(Log { writer: LogWriter::open(&path)?, path, is_written: true });
-        Ok(Self { logs: paths.map(log).collect::<Result<_, LogError>>()? })
+        Ok(Self(paths.map(log).collect::<Result<_, LogError>>()?))
     }
 
-    /// Writes an event of a row. Fails at the first failure of its log, which is not written again.
-    pub fn write(&mut self, row: usize, happening: &Happening) -> Result<(), LogError> {
-        self.logs[row].write(|writer| writer.write(happening))
+    /// Writes into a row's log. Fails at the first failure of the log, which is not written again.
+    pub fn write(
+        &mut self,
+        row: usize,
+        work: impl FnOnce(&mut LogWriter) -> Result<(), LogError>,
+    ) -> Result<(), LogError> {
+        let log = &mut self.0[row];
+        let written = if log.is_written { work(&mut log.writer) } else { Ok(()) };
+        written.inspect_err(|_| log.is_written = false)
     }
 
     /// The time of a row's line written now, in milliseconds.
     fn now_ms(&self, row: usize) -> u64 {
-        self.logs[row].writer.now_ms()
-    }
-
-    /// Writes lines of this time into a row's log, as [`Logs::write`].
-    fn lines_at(&mut self, row: usize, time_ms: u64, lines: &Lines) -> Result<(), LogError> {
-        self.logs[row].write(|writer| writer.lines_at(time_ms, lines))
+        self.0[row].writer.now_ms()
     }
 
     /// Reports a log that could not be written. The other rows' logs continue. Fails if no log is left.
     fn go_on_after(&self, written: Result<(), LogError>, row: usize, chosen: &Chosen) -> Result<()> {
         if let Err(error) = written {
             tell!("error: {}", chosen.under_name(row, &format!("{:#}", anyhow::Error::from(error))));
-            ensure!(self.logs.iter().any(|log| log.is_written), "no log can be written any more");
+            ensure!(self.0.iter().any(|log| log.is_written), "no log can be written any more");
         }
         Ok(())
     }
 
     /// Says what is in them, and fails if one could not be written.
     fn end(&self) -> Result<()> {
-        for Log { path, writer, .. } in &self.logs {
+        for Log { path, writer, .. } in &self.0 {
             tell!("{} lines were added: {} has {} now", writer.added, path.display(), writer.lines());
         }
         self.check()
@@ -174,7 +162,7 @@ impl Logs {
 
     /// Fails if one could not be written.
     pub fn check(&self) -> Result<()> {
-        match self.logs.iter().find(|log| !log.is_written) {
+        match self.0.iter().find(|log| !log.is_written) {
             Some(log) => bail!("{} is not whole: it could not be written", log.path.display()),
             None => Ok(()),
         }

@@ -192,7 +192,7 @@ impl<'a> Talk<'a> {
         let row = heard.row;
         let standing = &mut self.standing[row];
         if let (Some(logs), What::Happened(happening)) = (&mut self.logs, &heard.what) {
-            logs.write(row, happening)?;
+            logs.write(row, |log| log.write(happening))?;
         }
         let mut print = |line: &str| writeln!(output, "{}", self.chosen.under_name(row, line));
         match &heard.what {

@@ -26,7 +26,7 @@ fn watch(terminal: &mut DefaultTerminal, rows: &Rows, mut model: Model, logs: &m
         let until = Instant::now() + TURN;
         while let Some(heard) = rows.next(until.saturating_duration_since(Instant::now())) {
             if let (Some(logs), What::Happened(happening)) = (&mut *logs, &heard.what)
-                && let Err(error) = logs.write(heard.row, happening)
+                && let Err(error) = logs.write(heard.row, |log| log.write(happening))
             {
                 // The machine is still watched, and the other rows' logs are still written.
                 model.say(format!("-- {:#}", anyhow::Error::from(error)));
