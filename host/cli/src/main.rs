@@ -279,16 +279,6 @@ mod tests {
     /// The report of a trial.
     const TRIAL: [&str; 3] = ["reports/report.html", "reports/trial.csv", "reports/controllers.csv"];
 
-    /// Every argument that takes a word that could name a file, as `command.subcommand:argument`, and its type.
-    fn words_taken() -> Vec<(String, Arg)> {
-        let of_one = |(name, command): &(String, Command)| -> Vec<(String, Arg)> {
-            let name = name.replace(' ', ".");
-            let takes = |arg: &&Arg| arg.get_action().takes_values() && is_free(arg);
-            command.get_arguments().filter(takes).map(|arg| (format!("{name}:{}", arg.get_id()), arg.clone())).collect()
-        };
-        commands().iter().flat_map(of_one).collect()
-    }
-
     /// Whether it takes free text or a path, without its own parser or list of values.
     fn is_free(argument: &Arg) -> bool {
         let parser = argument.get_value_parser();
@@ -311,14 +301,22 @@ mod tests {
             .map(str::to_owned)
             .collect();
         let replaced: BTreeSet<String> = WRITERS.iter().map(|(argument, ..)| (*argument).to_owned()).collect();
-        let taken = words_taken();
-        for (name, argument) in &taken {
-            assert_eq!(writes(argument), replaced.contains(name), "{name}: is what is there replaced? See WRITERS");
-            // Only the commands in EDITED write the file with the rows' names.
-            let is_kept = kept.contains(name) || name.ends_with(":rows_file");
-            assert_ne!(writes(argument), is_kept, "{name}: what happens to a file that is there?");
+        let mut known = BTreeSet::new();
+        for (command_name, command) in commands() {
+            let takes_words = |argument: &&Arg| argument.get_action().takes_values() && is_free(argument);
+            for argument in command.get_arguments().filter(takes_words) {
+                let name = format!("{}:{}", command_name.replace(' ', "."), argument.get_id());
+                assert_eq!(
+                    writes(argument),
+                    replaced.contains(&name),
+                    "{name}: is what is there replaced? See WRITERS"
+                );
+                // Only the commands in EDITED write the file with the rows' names.
+                let is_kept = kept.contains(&name) || name.ends_with(":rows_file");
+                assert_ne!(writes(argument), is_kept, "{name}: what happens to a file that is there?");
+                known.insert(name);
+            }
         }
-        let known: BTreeSet<String> = taken.into_iter().map(|(name, _)| name).collect();
         let gone: Vec<&String> = kept.union(&replaced).filter(|name| !known.contains(*name)).collect();
         assert!(gone.is_empty(), "{gone:?} are no arguments");
     }
