@@ -9,10 +9,6 @@ use files::FileError;
 use std::ffi::{OsStr, OsString};
 use std::path::PathBuf;
 
-/// Standard input as a file, if the system has one.
-#[cfg(unix)]
-const STANDARD_INPUT: &str = "/dev/stdin";
-
 /// An input file.
 pub fn file() -> impl TypedValueParser<Value = PathBuf> {
     OsStringValueParser::new().try_map(|name| named(name).map(PathBuf::from))
@@ -27,9 +23,7 @@ pub fn preset_or_file() -> impl TypedValueParser<Value = String> {
 /// A file's name, or a word with another meaning. Fails only if the system has no file for standard input.
 fn named(name: OsString) -> Result<OsString, String> {
     match name.to_str() {
-        #[cfg(unix)]
-        Some("-") => Ok(STANDARD_INPUT.into()),
-        #[cfg(not(unix))]
+        Some("-") if cfg!(unix) => Ok("/dev/stdin".into()),
         Some("-") => Err("standard input cannot be read here: name a file".to_owned()),
         _ => Ok(name),
     }

@@ -46,10 +46,7 @@ pub fn write(image: &Path, port: &str, baud: u32) -> Result<(bool, Option<Signat
         .with_context(|| format!("avrdude cannot be started: {GET_IT}, or flash in the page"))?;
     let (heard, alive) = mpsc::channel();
     let words = avrdude.stderr.take();
-    let reader = thread::spawn(move || {
-        let from = words.map(BufReader::new);
-        from.and_then(|from| pass_on(from, io::stderr(), &heard))
-    });
+    let reader = thread::spawn(move || pass_on(BufReader::new(words?), io::stderr(), &heard));
     let (mut last_word, mut gone_at) = (Instant::now(), None);
     let succeeded = loop {
         match alive.recv_timeout(LOOK) {
