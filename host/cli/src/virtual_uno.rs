@@ -149,7 +149,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     });
     let stop = ctrl_c()?;
 
-    let of_row = |path: &Option<PathBuf>, row: usize| path.as_ref().map(|path| of_row(path, row, count));
+    let of_row = |path: &Option<PathBuf>, row| path.as_deref().map(|path| of_row(path, row, count));
     let setup = |(row, course)| Setup {
         elf: elf.clone(),
         bootloader: bootloader.clone(),
@@ -218,11 +218,10 @@ fn next_command(ports: &[&Path], bootloader: Option<&Bootloader>) -> Result<Stri
 
 /// A row's own file or link. Its name ends with the row's number if there are several rows.
 fn of_row(path: &Path, row: usize, count: usize) -> PathBuf {
-    if count == 1 {
-        return path.to_owned();
-    }
     let mut name = path.as_os_str().to_owned();
-    name.push((row + 1).to_string());
+    if count > 1 {
+        name.push((row + 1).to_string());
+    }
     name.into()
 }
 
