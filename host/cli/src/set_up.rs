@@ -233,13 +233,13 @@ impl Guide {
                     Ok(typed) => break typed,
                     Err(TryRecvError::Disconnected) => return Err(Error::msg(End::Stop)),
                     // Waits a fiftieth of a second for a line of the machine.
-                    Err(TryRecvError::Empty) => match self.link.next_line()? {
-                        Some(line) if self.watches => match ConsoleLine::parse(&line) {
-                            ConsoleLine::Event(EventLine::Detection { .. }) => say!("\n    {line}")?,
-                            _ => {}
-                        },
-                        _ => {}
-                    },
+                    Err(TryRecvError::Empty) => {
+                        if let (Some(line), true) = (self.link.next_line()?, self.watches)
+                            && let ConsoleLine::Event(EventLine::Detection { .. }) = ConsoleLine::parse(&line)
+                        {
+                            say!("\n    {line}")?;
+                        }
+                    }
                 }
             };
             let answer = match (typed.text.trim(), shown) {
