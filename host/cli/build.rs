@@ -23,9 +23,6 @@ const FIRMWARE: [&str; 6] = [
 /// The page, in the order that `serve::Page` expects.
 const PAGE: [&str; 3] = ["page/index.html", "page/page.css", "page/page.js"];
 
-/// Length of a commit's name.
-const DIGITS: &str = "--short=7";
-
 fn main() {
     let version = env::var("CARGO_PKG_VERSION").expect("cargo names the package's version");
     let commit = commit_of_the_clone().map(|commit| format!(" ({commit})")).unwrap_or_default();
@@ -65,9 +62,7 @@ fn commit_of_the_clone() -> Option<String> {
     for file in git(&["-C", &root, "ls-files"])?.lines() {
         println!("cargo::rerun-if-changed={root}/{file}");
     }
-    let commit = git(&["rev-parse", DIGITS, "HEAD"])?;
-    let changed = git(&["status", "--porcelain", "--untracked-files=no"])?;
-    Some(if changed.is_empty() { commit } else { commit + "+" })
+    git(&["describe", "--always", "--exclude=*", "--abbrev=7", "--dirty=+"])
 }
 
 /// git's output, if it succeeds.

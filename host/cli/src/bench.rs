@@ -1,9 +1,8 @@
 //! `weeder bench-uno`: limits and costs of the firmware and its classifier on an Arduino Uno.
 
-use crate::output::say;
-use crate::progress::with_bar;
 use anyhow::Result;
 use clap::Args;
+use frame::{say, with_bar};
 use knn_bench::Task;
 use serde_json::{Value, json};
 use uno::elf::Size;

@@ -2,12 +2,11 @@
 //! The firmware and its budgets are this repository's. Commands that flash a firmware first check here whether its
 //! bounds are proved.
 
-use crate::output::{print, tell};
-use crate::program::Finding;
 use anyhow::{Result, bail, ensure};
 use avr_bounds::command::{Options, Report, report};
 use avr_bounds::{Budgets, Held, Program};
 use clap::Args;
+use frame::{Finding, print, tell};
 use std::path::{Path, PathBuf};
 use uno::elf::Image;
 use uno_run::firmware;
@@ -88,10 +87,7 @@ impl Firmware {
         prove(&elf, &firmware::budgets(self.tester)?)
     }
 
-    /// Proves this firmware's bounds, and says where that fails but is insisted on.
-    ///
-    /// # Errors
-    /// If it fails, or a bound is over its budget, without `--unproved`.
+    /// Proves this firmware's bounds. Fails if one is not proved, or is over its budget; with `--unproved` this only warns.
     pub fn check(&self, elf: &Path) -> Result<()> {
         let why = match self.prove(elf) {
             Ok(held) => match held.into_iter().find(|held| !held.keeps) {

@@ -1,15 +1,12 @@
 //! `weeder check-board`: a second Uno, the tester, drives the weeder's inputs and measures its outputs.
 
 use crate::ctrl_c;
-use crate::destination::{OutName, Replace, write_if_asked};
-use crate::output::{print, tell};
-use crate::program::Finding;
-use crate::progress::with_bar;
 use anyhow::Result;
 use check_board::Boards;
 use check_board::desk::Desk;
 use check_board::run::{Extent, run as check_run};
 use clap::Args;
+use frame::{Finding, OutName, Replace, print, tell, with_bar, write_if_asked};
 use link::row_names::plugged;
 use std::cell::Cell;
 use std::path::{Path, PathBuf};
@@ -89,7 +86,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     let mut report = result?;
     report.board.clone_from(&arguments.board);
     let printed = print(format_args!("{}", if arguments.json { report.json() } else { report.text() }));
-    write_if_asked(page.as_ref(), "Written", arguments.json, |to| to.write_all(report.page().as_bytes()))?;
+    write_if_asked(page.as_ref(), "Written", arguments.json, |to| Ok(to.write_all(report.page().as_bytes())?))?;
     printed?;
     Ok(Finding::of(report.is_good()))
 }

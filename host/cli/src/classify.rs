@@ -2,13 +2,10 @@
 //!
 //! The built-in examples, the scale, the radius and the code of the search are the firmware's.
 
-use crate::numbers::whole_within;
-use crate::output::say;
-use crate::program::Finding;
-use crate::source;
 use anyhow::Result;
 use clap::Args;
 use field::row::Kind;
+use frame::{Finding, say, source, whole_within};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use study::training::table::{self, Recorded};

@@ -3,10 +3,10 @@
 //! clap_complete makes them from the arguments themselves. They include presets and the axes of sweeps, but neither
 //! ports nor values of settings.
 
-use crate::{output, program};
 use anyhow::Result;
 use clap::Args;
 use clap_complete::Shell;
+use frame::{print, program};
 
 #[derive(Args)]
 #[command(after_help = "\
@@ -24,5 +24,5 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let mut command = program::grammar::<crate::Arguments>();
     let mut script = Vec::new();
     clap_complete::generate(arguments.shell, &mut command, "weeder", &mut script);
-    output::print(format_args!("{}", String::from_utf8_lossy(&script)))
+    print(format_args!("{}", String::from_utf8_lossy(&script)))
 }

@@ -1,10 +1,9 @@
 //! `weeder design`: the required engine, servo, shanks, chain, wheels and handle of a machine, and its tool's swing as
 //! settings for the firmware.
 
-use crate::output::{print, say};
-use crate::source;
 use anyhow::Result;
 use clap::Args;
+use frame::{print, say, source};
 use mechanics::design::Design;
 use mechanics::machine::Machine;
 use mechanics::swing::Swing;

@@ -1,11 +1,8 @@
 //! `weeder evaluate`: evaluates a field trial from the counts and measurements of its plots.
 
-use crate::destination::{OutFolder, OutName, Replace};
-use crate::numbers::{number_within, whole_within};
-use crate::output::{self, say, tell};
-use crate::source;
 use anyhow::{Context, Result};
 use clap::Args;
+use frame::{OutFolder, OutName, Replace, command_line, number_within, print, say, source, tell, whole_within};
 use logbook::worked::worked;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -13,7 +10,6 @@ use study::evaluation::field_log::{self, OfLog};
 use study::evaluation::{self, Analysis, PlotRecord, ResponseAnalysis};
 use study::page::Page;
 
-/// The report's name in its folder.
 const REPORT: &str = "report.html";
 
 #[derive(Args)]
@@ -69,8 +65,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             json["log"] = json!(joined);
             say!("{json:#}")
         }
-        (false, Some(joined)) => output::print(format_args!("{}\n\n{analysis}", field_log::of_log_table(joined))),
-        (false, None) => output::print(format_args!("{analysis}")),
+        (false, Some(joined)) => print(format_args!("{}\n\n{analysis}", field_log::of_log_table(joined))),
+        (false, None) => print(format_args!("{analysis}")),
     };
     if let Some(folder) = &folder {
         write_report(&analysis, joined.as_deref(), arguments, folder)?;
@@ -96,7 +92,7 @@ fn write_report(
         title: &format!("Field trial: {name}"),
         summary: analysis.findings(),
         paper: analysis.against_the_paper(),
-        command: &output::command_line()?,
+        command: &command_line()?,
         parameters: &parameters,
         analysis,
         log: joined.map(field_log::of_log_table),
@@ -104,7 +100,7 @@ fn write_report(
         row: None,
     };
     let html = page.html()?;
-    folder.write(REPORT, |to| to.write_all(html.as_bytes()))
+    folder.write(REPORT, |to| Ok(to.write_all(html.as_bytes())?))
 }
 
 /// The whole analysis. Without a model, `no_model` says why.

@@ -1,15 +1,12 @@
 //! `weeder examples`: the taught examples of a machine as a table, to save, to train from, and to teach to another
 //! machine.
 
-use crate::destination::{OutName, Replace};
-use crate::output::{say, tell};
 use crate::ports::Port;
-use crate::program::Finding;
-use crate::source;
 use anyhow::{Result, bail, ensure};
 use clap::{Args, Subcommand};
 use comfy_table::{Table, presets};
 use field::row::Kind;
+use frame::{Finding, OutName, Replace, say, source, tell};
 use link::examples::{self, Taught, contradiction, example_of, features_of};
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
@@ -86,7 +83,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
                 if *json { say!("{:#}", Value::from_iter(taught.iter().filter_map(in_json))) } else { Ok(()) };
             if let Some(file) = file {
                 let objects: Vec<Labelled> = taught.iter().filter_map(object).collect();
-                file.write(|to| listing::write_csv(&objects, to))?;
+                file.write(|to| Ok(listing::write_csv(&objects, to)?))?;
                 if !json {
                     say!("The taught examples are in {}: {} examples", file.path().display(), taught.len())?;
                 }
@@ -136,10 +133,7 @@ fn on_machine(port: &Port) -> Result<Vec<Taught>> {
     Ok(examples::read(&mut port.open()?)?.into_iter().map(|(_, example)| example).collect())
 }
 
-/// A table's examples, each once; at least one.
-///
-/// # Errors
-/// If it is no such table.
+/// A table's examples, each once; at least one. Fails if it is no such table.
 pub fn in_table(file: &Path) -> Result<Vec<Taught>> {
     let objects = table::read(file)?;
     let mut examples = Vec::new();

@@ -4,11 +4,10 @@
 //! --speeds 1,2 -->`. The command runs, and its output becomes the block. The output is the same on every machine: run
 //! times go to standard error, which is left out.
 
-use crate::output::{say, tell};
-use crate::program::Finding;
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use files::whole_file;
+use frame::{Finding, say, tell};
 use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -84,10 +83,8 @@ fn print(command: &str) -> Result<String> {
     // Status 1 is a finding, such as a damaged plant.
     ensure!(matches!(output.status.code(), Some(0 | 1)), "`{command}` fails: run it to see why");
     let printed = String::from_utf8(output.stdout).with_context(|| format!("`{command}` prints no text"))?;
-    let lines = printed.lines().map(str::trim_end);
-    let lines: Vec<&str> = lines.collect();
-    let text = lines.join("\n");
-    Ok(format!("{}\n", text.trim_matches('\n')))
+    let lines: Vec<&str> = printed.lines().map(str::trim_end).collect();
+    Ok(format!("{}\n", lines.join("\n").trim_matches('\n')))
 }
 
 /// The lines that differ, those of the page first.

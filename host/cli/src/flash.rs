@@ -5,10 +5,10 @@ mod bootloader;
 
 use self::bootloader::{ATMEGA328P, Heard, Signature, heard};
 use crate::bounds::Firmware;
-use crate::output::say;
 use crate::ports::Port;
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use clap::Args;
+use frame::say;
 use link::Claim;
 use link::row_names::Board;
 use std::io;
@@ -41,18 +41,15 @@ pub struct Arguments {
 
 /// A bootloader: its rate in bits a second, and the flash that it leaves. It takes the last 512 or 2048 bytes of 32 KiB.
 #[derive(Clone, Copy)]
-struct Bootloader {
+pub struct Bootloader {
     baud: u32,
-    available: usize,
+    pub available: usize,
     /// What the user adds to the command for it.
     option: &'static str,
 }
 
 const OPTIBOOT: Bootloader = Bootloader { baud: 115_200, available: 32_256, option: "without --old-bootloader" };
-const OLD: Bootloader = Bootloader { baud: 57_600, available: OLD_AVAILABLE_BYTES, option: "with --old-bootloader" };
-
-/// Flash for the firmware beside the old bootloader, in bytes.
-pub const OLD_AVAILABLE_BYTES: usize = 30_720;
+pub const OLD: Bootloader = Bootloader { baud: 57_600, available: 30_720, option: "with --old-bootloader" };
 
 /// Flashes, with each of avrdude's own messages once on the terminal.
 pub fn run(arguments: &Arguments) -> Result<()> {
@@ -91,20 +88,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let folder = tempfile::tempdir().context("there is no room for a temporary file")?;
     let image = folder.path().join("weeder.hex");
     std::fs::write(&image, hex::text(&flash)).context("there is no room for a temporary file")?;
-    let written = avrdude::write(&image, &port, bootloader.baud)?;
-    ensure!(!written.port_is_gone, "{port} is gone while the Uno was written: plug it in, and flash it again. {WHOLE}");
-    ensure!(
-        !written.is_silent,
-        "avrdude fell silent and was ended: plug the Uno out and in, and flash it again. {WHOLE}"
-    );
-    if !written.succeeded {
-        bail!("avrdude did not succeed: {}", why(&claim, &port, bootloader, other, written.signature));
-    }
+    let (succeeded, signature) = avrdude::write(&image, &port, bootloader.baud)?;
+    ensure!(succeeded, "avrdude did not succeed: {}", why(&claim, &port, bootloader, other, signature));
     say!("Done: the Uno runs it. `weeder monitor --port {port}` talks to it.")
 }
-
-/// Writing cannot reach the bootloader.
-const WHOLE: &str = "The bootloader is not changed";
 
 /// Seconds from the reset until the firmware starts: the bytes go to the Uno and back, a page takes 5 ms to write, and
 /// the bootloader waits.

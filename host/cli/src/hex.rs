@@ -2,10 +2,9 @@
 //! use this command, so they contain a proved firmware.
 
 use crate::bounds::Firmware;
-use crate::destination::{OutName, Replace};
-use crate::output::say;
 use anyhow::Result;
 use clap::Args;
+use frame::{OutName, Replace, say};
 use uno::elf::Image;
 use uno::hex;
 
@@ -33,6 +32,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let elf = arguments.firmware.elf()?;
     let flash = Image::read(&elf)?.flash;
     arguments.firmware.check(&elf)?;
-    out.write(|to| to.write_all(hex::text(&flash).as_bytes()))?;
+    out.write(|to| Ok(to.write_all(hex::text(&flash).as_bytes())?))?;
     say!("Written     {}, {} bytes of flash", out.path().display(), flash.len())
 }

@@ -3,7 +3,9 @@
 //! CR, LF or both end a line. A byte order mark is dropped, and UTF-16 is read, because some shells write both. A byte
 //! that is no text spoils its own line only. Lines are bounded, so that input without line ends is refused too.
 
-use std::io::{ErrorKind, Read};
+use std::io::{self, ErrorKind, Read};
+use std::sync::mpsc::{self, Receiver};
+use std::thread;
 
 /// The greatest length of a line in characters: more than a row's name and a command.
 const LIMIT: usize = 200;
@@ -43,6 +45,16 @@ impl Encoding {
             _ => (Self::Bytes, 0),
         })
     }
+
+    /// The first character, and the bytes behind it.
+    fn first(self, bytes: &[u8]) -> Option<(u16, &[u8])> {
+        match (self, bytes) {
+            (Self::Bytes, [byte, rest @ ..]) => Some((u16::from(*byte), rest)),
+            (Self::LittleEndian, [low, high, rest @ ..]) => Some((u16::from_le_bytes([*low, *high]), rest)),
+            (Self::BigEndian, [high, low, rest @ ..]) => Some((u16::from_be_bytes([*high, *low]), rest)),
+            _ => None,
+        }
+    }
 }
 
 /// Collects bytes to lines.
@@ -69,20 +81,12 @@ impl Lines {
             self.encoding = Some(encoding);
             self.begun.drain(..mark);
         }
-        let width = match self.encoding {
-            None => return Vec::new(),
-            Some(Encoding::Bytes) => 1,
-            Some(_) => 2,
-        };
+        let Some(encoding) = self.encoding else { return Vec::new() };
         let begun = std::mem::take(&mut self.begun);
-        let (whole, rest) = begun.split_at(begun.len() - begun.len() % width);
-        for character in whole.chunks(width) {
-            let code = match (self.encoding, character) {
-                (Some(Encoding::LittleEndian), &[low, high]) => u16::from_le_bytes([low, high]),
-                (_, &[high, low]) => u16::from_be_bytes([high, low]),
-                (_, bytes) => bytes.first().copied().unwrap_or_default().into(),
-            };
+        let mut rest = begun.as_slice();
+        while let Some((code, behind)) = encoding.first(rest) {
             self.character(code);
+            rest = behind;
         }
         if is_all {
             // A last line without an end is a line too.
@@ -119,20 +123,26 @@ impl Lines {
     }
 }
 
-/// Reads lines until the input ends, and passes each on at once. Ends early where `pass_on` returns false.
-pub fn read(mut from: impl Read, mut pass_on: impl FnMut(Line) -> bool) {
-    let (mut lines, mut bytes) = (Lines::default(), [0; 1024]);
-    loop {
-        let count = match from.read(&mut bytes) {
-            Ok(count) => count,
-            Err(error) if error.kind() == ErrorKind::Interrupted => continue,
-            // An input that is gone has ended. What came before is sent.
-            Err(_) => 0,
-        };
-        if !lines.take(&bytes[..count], count == 0).into_iter().all(&mut pass_on) || count == 0 {
-            return;
+/// The lines of standard input, each read once the caller has taken the one before. The channel ends with the input.
+pub fn typed() -> Receiver<Line> {
+    let (sender, typed) = mpsc::sync_channel(0);
+    // Reading blocks until a person types, so it has its own thread. The thread ends with the process.
+    thread::spawn(move || {
+        let (mut input, mut lines, mut bytes) = (io::stdin().lock(), Lines::default(), [0; 1024]);
+        loop {
+            let count = match input.read(&mut bytes) {
+                Ok(count) => count,
+                Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+                // An input that is gone has ended. What came before is sent.
+                Err(_) => 0,
+            };
+            let lines = lines.take(&bytes[..count], count == 0);
+            if !lines.into_iter().all(|line| sender.send(line).is_ok()) || count == 0 {
+                return;
+            }
         }
-    }
+    });
+    typed
 }
 
 #[cfg(test)]
@@ -176,23 +186,6 @@ mod tests {
         ]
     }
 
-    /// What shells do with a text: how they encode it, mark it, end its lines, and whether they end the last one.
-    #[derive(Clone, Copy, Debug)]
-    struct Habit {
-        encoding: &'static str,
-        marked: bool,
-        end: &'static str,
-        last_ended: bool,
-        piece: usize,
-    }
-
-    fn any_habit() -> impl Strategy<Value = Habit> {
-        let encoding = prop::sample::select(vec!["utf-8", "latin-1", "utf-16le", "utf-16be"]);
-        let end = prop::sample::select(vec!["\n", "\r\n", "\r"]);
-        (encoding, any::<bool>(), end, any::<bool>(), 1..9_usize)
-            .prop_map(|(encoding, marked, end, last_ended, piece)| Habit { encoding, marked, end, last_ended, piece })
-    }
-
     /// The bytes of a character.
     fn encoded(character: char, encoding: &str) -> Vec<u8> {
         let units = || character.encode_utf16(&mut [0; 2]).to_vec();
@@ -207,20 +200,26 @@ mod tests {
     proptest! {
         #[test]
         fn any_habit_of_a_shell_leaves_every_line_its_number_and_a_strange_character_spoils_its_line_only(
-            texts in vec(any_text(), 0..6), habit in any_habit(),
+            texts in vec(any_text(), 0..6),
+            // What shells do with a text: how they encode it, mark it, end its lines, and whether they end the last one.
+            encoding in prop::sample::select(vec!["utf-8", "latin-1", "utf-16le", "utf-16be"]),
+            marked in any::<bool>(),
+            end in prop::sample::select(vec!["\n", "\r\n", "\r"]),
+            last_ended in any::<bool>(),
+            piece in 1..9_usize,
         ) {
             // Without a mark, only a first ASCII character shows that it is UTF-16.
-            let is_shown = habit.marked || texts.first().is_none_or(|text| text.starts_with(|c: char| c.is_ascii()));
-            prop_assume!(!habit.encoding.starts_with("utf-16") || is_shown);
-            let mut script = texts.join(habit.end);
-            if habit.last_ended && !texts.is_empty() {
-                script.push_str(habit.end);
+            let is_shown = marked || texts.first().is_none_or(|text| text.starts_with(|c: char| c.is_ascii()));
+            prop_assume!(!encoding.starts_with("utf-16") || is_shown);
+            let mut script = texts.join(end);
+            if last_ended && !texts.is_empty() {
+                script.push_str(end);
             }
-            if habit.marked && habit.encoding != "latin-1" {
+            if marked && encoding != "latin-1" {
                 script.insert(0, '\u{feff}');
             }
-            let input: Vec<u8> = script.chars().flat_map(|character| encoded(character, habit.encoding)).collect();
-            let mut found = lines(&input, habit.piece).into_iter();
+            let input: Vec<u8> = script.chars().flat_map(|character| encoded(character, encoding)).collect();
+            let mut found = lines(&input, piece).into_iter();
             for (number, text) in (1..).zip(&texts) {
                 let is_last = number == texts.len();
                 match found.next() {
@@ -233,7 +232,7 @@ mod tests {
                         }
                     }
                     // Only a last line that is empty and has no end is no line.
-                    None => prop_assert!(is_last && text.is_empty() && !habit.last_ended, "line {} is lost", number),
+                    None => prop_assert!(is_last && text.is_empty() && !last_ended, "line {} is lost", number),
                 }
             }
             prop_assert_eq!(found.next(), None);

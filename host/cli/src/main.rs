@@ -42,8 +42,7 @@ mod virtual_uno;
 
 use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
-use frame::program::Finding;
-use frame::{course, destination, numbers, output, program, progress, row, source};
+use frame::{Finding, program, row};
 use inside::INSIDE;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -183,14 +182,14 @@ fn ctrl_c() -> Result<Arc<AtomicBool>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::destination::OutName;
-    use crate::program::parse;
     use clap::{Arg, Command};
+    use frame::OutName;
+    use frame::program::parse;
     use std::any::TypeId;
     use std::collections::BTreeSet;
     use std::ffi::OsString;
     use std::fs;
-    use std::path::{Path, PathBuf};
+    use std::path::PathBuf;
 
     #[test]
     fn the_arguments_are_well_formed() {
@@ -286,16 +285,6 @@ mod tests {
     /// The report of a trial.
     const TRIAL: [&str; 3] = ["reports/report.html", "reports/trial.csv", "reports/controllers.csv"];
 
-    /// Every argument that takes a word that could name a file, as `command.subcommand:argument`, and its type.
-    fn words_taken() -> Vec<(String, Arg)> {
-        let of_one = |(name, command): &(String, Command)| -> Vec<(String, Arg)> {
-            let name = name.replace(' ', ".");
-            let takes = |arg: &&Arg| arg.get_action().takes_values() && is_free(arg);
-            command.get_arguments().filter(takes).map(|arg| (format!("{name}:{}", arg.get_id()), arg.clone())).collect()
-        };
-        commands().iter().flat_map(of_one).collect()
-    }
-
     /// Whether it takes free text or a path, without its own parser or list of values.
     fn is_free(argument: &Arg) -> bool {
         let parser = argument.get_value_parser();
@@ -318,14 +307,22 @@ mod tests {
             .map(str::to_owned)
             .collect();
         let replaced: BTreeSet<String> = WRITERS.iter().map(|(argument, ..)| (*argument).to_owned()).collect();
-        let taken = words_taken();
-        for (name, argument) in &taken {
-            assert_eq!(writes(argument), replaced.contains(name), "{name}: is what is there replaced? See WRITERS");
-            // Only the commands in EDITED write the file with the rows' names.
-            let is_kept = kept.contains(name) || name.ends_with(":rows_file");
-            assert_ne!(writes(argument), is_kept, "{name}: what happens to a file that is there?");
+        let mut known = BTreeSet::new();
+        for (command_name, command) in commands() {
+            let takes_words = |argument: &&Arg| argument.get_action().takes_values() && is_free(argument);
+            for argument in command.get_arguments().filter(takes_words) {
+                let name = format!("{}:{}", command_name.replace(' ', "."), argument.get_id());
+                assert_eq!(
+                    writes(argument),
+                    replaced.contains(&name),
+                    "{name}: is what is there replaced? See WRITERS"
+                );
+                // Only the commands in EDITED write the file with the rows' names.
+                let is_kept = kept.contains(&name) || name.ends_with(":rows_file");
+                assert_ne!(writes(argument), is_kept, "{name}: what happens to a file that is there?");
+                known.insert(name);
+            }
         }
-        let known: BTreeSet<String> = taken.into_iter().map(|(name, _)| name).collect();
         let gone: Vec<&String> = kept.union(&replaced).filter(|name| !known.contains(*name)).collect();
         assert!(gone.is_empty(), "{gone:?} are no arguments");
     }
@@ -341,14 +338,6 @@ mod tests {
         }
     }
 
-    /// Runs a command in this process, with `DIR` for a folder.
-    fn run_in(folder: &Path, words: &str) -> Result<Finding> {
-        let folder = folder.to_str().expect("it is text");
-        let words = ["weeder"].into_iter().chain(words.split(' '));
-        let words = words.map(|word| OsString::from(word.replace("DIR", folder)));
-        run(parse::<Arguments>(words.collect()).unwrap_or_else(|error| panic!("{error}")).command)
-    }
-
     #[test]
     fn no_command_replaces_an_existing_file_without_force() {
         let folder = tempfile::tempdir().expect("there is room for a folder");
@@ -357,7 +346,11 @@ mod tests {
         fs::write(path("log.csv"), "time_ms,kind,line\n0,connected,0.2.0\n").unwrap();
         let filled = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/trial-example.csv");
         fs::copy(filled, path("filled.csv")).unwrap();
-        let run = |words: &str| run_in(folder.path(), words);
+        let run = |words: &str| {
+            let words = format!("weeder {words}").replace("DIR", folder.path().to_str().expect("it is text"));
+            let words = words.split(' ').map(OsString::from).collect();
+            run(parse::<Arguments>(words).unwrap_or_else(|error| panic!("{error}")).command)
+        };
         let small = "--field DIR/small.toml --shard 1/1 --out";
         run(&format!("trial --speeds 2 --spacings 50 {small} DIR/trial.part")).expect("it computes a part");
         run(&format!("sweep --x k=1..1:1 {small} DIR/sweep.part")).expect("it computes a part");

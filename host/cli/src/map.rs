@@ -1,13 +1,10 @@
 //! `weeder map`: shows logs with a satellite receiver on a map, and summarises them.
 
-use crate::destination::{OutName, Replace};
-use crate::numbers::number_within;
-use crate::output::{print, say, tell};
 use crate::receiver::AntennaArguments;
-use crate::source;
 use anyhow::Result;
 use clap::Args;
 use comfy_table::{Table, presets};
+use frame::{OutName, Replace, number_within, print, say, source, tell};
 use gps::job::{self, Wanted};
 use gps::summary::{Stand, Summary};
 use gps::wheel::Ratio;
@@ -81,11 +78,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         false => print(format_args!("{}\n", shown(&counted))),
     };
     let named: Vec<(&str, &Job)> = jobs.iter().map(|(name, job)| (name.as_str(), job)).collect();
-    out.write(|to| writeln!(to, "{}", map::features(&named)))?;
+    out.write(|to| Ok(writeln!(to, "{}", map::features(&named))?))?;
     if let Some(svg) = &svg {
         let jobs: Vec<&Job> = jobs.iter().map(|(_, job)| job).collect();
         match picture::draw(&jobs, &picture::Words::default()) {
-            Some(drawn) => svg.write(|to| svg::write(to, &drawn))?,
+            Some(drawn) => svg.write(|to| Ok(svg::write(to, &drawn)?))?,
             None => tell!("{} is not drawn: no event in the records has a position", svg.path().display()),
         }
     }

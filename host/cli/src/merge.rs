@@ -2,10 +2,10 @@
 //!
 //! It simulates nothing. The parts hold all outcomes, and the code of an undivided study shows them.
 
-use crate::program::Finding;
 use crate::{part, part::Shown, soak, sweep, trial};
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
+use frame::Finding;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::fs::File;

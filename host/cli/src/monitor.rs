@@ -10,11 +10,11 @@ mod plain;
 mod terminal;
 mod view;
 
-use crate::ports::Ports;
-use crate::program::Finding;
+use crate::ports::{Ports, find};
 use crate::record::{self, Logs};
 use anyhow::Result;
 use clap::Args;
+use frame::Finding;
 use link::row_names::ALL;
 use link::session::HOLD;
 use std::path::PathBuf;
@@ -45,12 +45,10 @@ pub struct Arguments {
 }
 
 /// Parses a typed line: the row before a colon, or `all`, and the command. Without a row it goes to `chosen`. `None` is
-/// all rows.
-///
-/// # Errors
-/// If there is no such row, or the rest is no command; in words.
+/// all rows. Fails if there is no such row, or the rest is no command; in words.
 fn addressed<'a>(line: &'a str, names: &[String], chosen: Option<usize>) -> Result<(Option<usize>, &'a str), String> {
-    let (to, command) = match line.split_once(':').map(|(name, command)| (row(name.trim(), names), command.trim())) {
+    let row = |name: &str| if name == ALL { Ok(None) } else { find(name, names).map(Some) };
+    let (to, command) = match line.split_once(':').map(|(name, command)| (row(name.trim()), command.trim())) {
         Some((Ok(to), command)) => (to, command),
         Some((Err(why), _)) if names.len() > 1 => return Err(why),
         _ => (chosen, line.trim()),
@@ -64,16 +62,9 @@ fn addressed<'a>(line: &'a str, names: &[String], chosen: Option<usize>) -> Resu
     }
 }
 
-fn row(name: &str, names: &[String]) -> Result<Option<usize>, String> {
-    match names.iter().position(|known| known == name) {
-        None if name != ALL => Err(format!("there is no row {name}: there are {}", names.join(", "))),
-        row => Ok(row),
-    }
-}
-
 /// Watches until the user quits.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
-    let chosen = arguments.ports.choose()?;
+    let chosen = arguments.ports.choose(None)?;
     let logs = arguments.log.as_deref().map(|out| Logs::open(out, &chosen)).transpose()?;
     let (rows, are_there) = record::open(&chosen)?;
     match arguments.plain {

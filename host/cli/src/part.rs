@@ -3,10 +3,9 @@
 //! A part names the program that computed it: the version, and a checksum of the program's file. The version alone is
 //! not enough, because an unreleased build has the version of the last release.
 
-use crate::destination::{OutFile, OutFolder, OutName, Replace};
-use crate::output::{say, tell};
 use anyhow::{Context, Result};
 use clap::{Args, builder::PossibleValuesParser};
+use frame::{OutFile, OutFolder, OutName, Replace, say, tell};
 use serde::Serialize;
 use std::env;
 use std::fs;
@@ -55,10 +54,8 @@ pub struct Part {
 }
 
 impl Part {
-    /// The part of a shard, if the user asks for one.
-    ///
-    /// # Errors
-    /// If the file could not be written, or this program cannot be read.
+    /// The part of a shard, if the user asks for one. Fails if the file could not be written, or this program cannot be
+    /// read.
     pub fn asked(shard: Option<Shard>, out: Option<&OutName>, replace: Replace) -> Result<Option<Self>> {
         let Some((shard, out)) = shard.zip(out) else { return Ok(None) };
         Ok(Some(Self { shard, out: out.file(replace)?, program: program()?, began: Instant::now() }))
@@ -75,7 +72,7 @@ impl Part {
         let settings = serde_json::to_value(settings)?;
         let header = Header::new(self.program, command, self.shard, all, settings);
         let count = outcomes.len();
-        self.out.write(|to| shard::write(&header, outcomes, to))?;
+        self.out.write(|to| Ok(shard::write(&header, outcomes, to)?))?;
         say!("Written: part {} of the {command}, {count} of {all}, to {}", self.shard, self.out.path().display())?;
         tell!("Pace: {:.1} s", self.began.elapsed().as_secs_f64());
         Ok(())

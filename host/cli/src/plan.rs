@@ -1,10 +1,8 @@
 //! `weeder plan`: creates a randomised plan of a field trial, as a table to fill in.
 
-use crate::destination::{OutName, Replace};
-use crate::numbers::{number_within, whole_within};
-use crate::output::{self, print, say};
 use anyhow::Result;
 use clap::Args;
+use frame::{OutName, Replace, command_line, number_within, print, say, whole_within};
 use study::plan::Plan;
 use study::sweep::{SPACINGS_CM, SPEEDS_KM_H};
 use study::table::distinct;
@@ -58,7 +56,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         seed: arguments.seed,
     };
     let notes = [
-        format!("Randomised: {}", output::command_line()?),
+        format!("Randomised: {}", command_line()?),
         "Mark out the plots side by side in this order; a block is a stretch of field that is as even as it can be."
             .to_owned(),
         "Count weeds on the same marked ground before and after, and the plants; write down area and time with turns."
@@ -66,7 +64,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         "Then: weeder evaluate THIS_FILE".to_owned(),
     ];
     if let Some(sheets) = &sheets {
-        sheets.write(|to| plan.write_sheets(to))?;
+        sheets.write(|to| Ok(plan.write_sheets(to)?))?;
     }
     match &out {
         None => {
@@ -75,7 +73,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             print(format_args!("{}", String::from_utf8_lossy(&table)))
         }
         Some(out) => {
-            out.write(|to| plan.write_csv(&notes, to))?;
+            out.write(|to| Ok(plan.write_csv(&notes, to)?))?;
             say!("Written: {}, {} plots in {} blocks", out.path().display(), plan.plots().len(), plan.blocks)
         }
     }

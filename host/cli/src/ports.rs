@@ -3,10 +3,10 @@
 //! A port is a path, such as /dev/ttyACM0, or a board's name from `weeder rows`. The name finds the board at any port.
 //! Messages about a named board begin with its name.
 
-use crate::output::tell;
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use etcetera::BaseStrategy;
+use frame::tell;
 use link::Link;
 use link::connection::Opener;
 use link::row_names::{Board, Names, Plugged, Row, plugged, wrong_with};
@@ -27,25 +27,17 @@ pub struct NamesFile {
 }
 
 impl NamesFile {
-    /// Its path.
-    ///
-    /// # Errors
-    /// If the user has no folder.
+    /// Its path. Fails if the user has no folder.
     pub fn path(&self) -> Result<PathBuf> {
-        match &self.rows_file {
-            Some(path) => Ok(path.clone()),
-            None => {
-                let strategy = etcetera::choose_base_strategy()
-                    .context("there is no folder for the user's settings: name a file by --rows-file")?;
-                Ok(strategy.config_dir().join(FILE))
-            }
+        if let Some(path) = &self.rows_file {
+            return Ok(path.clone());
         }
+        let strategy = etcetera::choose_base_strategy()
+            .context("there is no folder for the user's settings: name a file by --rows-file")?;
+        Ok(strategy.config_dir().join(FILE))
     }
 
-    /// The names in it.
-    ///
-    /// # Errors
-    /// If it cannot be read. A file named by the user must exist.
+    /// The names in it. A file named by the user must exist.
     pub fn read(&self) -> Result<Names> {
         let path = self.path()?;
         ensure!(
@@ -91,10 +83,7 @@ pub struct Port {
 }
 
 impl Port {
-    /// The board there.
-    ///
-    /// # Errors
-    /// If the file of the names cannot be read.
+    /// The board there. Fails if the file of the names cannot be read.
     pub fn board(&self) -> Result<Board> {
         match &self.port {
             Some(port) => self.names.board(port),
@@ -102,10 +91,7 @@ impl Port {
         }
     }
 
-    /// The machine there.
-    ///
-    /// # Errors
-    /// If there is none, or it is no weeder.
+    /// The machine there. Fails if there is none, or it is no weeder.
     pub fn open(&self) -> Result<Link> {
         Ok(self.board()?.open()?)
     }
@@ -120,10 +106,7 @@ pub struct Named {
     pub port: String,
 }
 
-/// Reads `NAME=PORT`, or a port or a row's name alone.
-///
-/// # Errors
-/// If it is neither, in words.
+/// Reads `NAME=PORT`, or a port or a row's name alone. Fails in words.
 pub fn named(text: &str) -> Result<Named, String> {
     let (name, port) = match text.split_once('=') {
         // A path may contain the sign.
@@ -139,6 +122,12 @@ pub fn named(text: &str) -> Result<Named, String> {
     }
 }
 
+/// The number of the row with this name. Fails with the names that there are, in words.
+pub fn find(name: &str, names: &[String]) -> Result<usize, String> {
+    let found = names.iter().position(|known| known == name);
+    found.ok_or_else(|| format!("there is no row {name}: there are {}", names.join(", ")))
+}
+
 /// The rows that a command talks to.
 pub struct Chosen {
     /// The rows, at least one.
@@ -148,19 +137,9 @@ pub struct Chosen {
 }
 
 impl Ports {
-    /// The chosen rows.
-    ///
-    /// # Errors
-    /// If there is none, two have a name, or the file of the names cannot be read.
-    pub fn choose(&self) -> Result<Chosen> {
-        self.choose_beside(None)
-    }
-
-    /// The chosen rows. A device at the port `beside`, such as a receiver, is none.
-    ///
-    /// # Errors
-    /// As [`choose`](Self::choose).
-    pub fn choose_beside(&self, beside: Option<&str>) -> Result<Chosen> {
+    /// The chosen rows. A device at the port `beside`, such as a receiver, is none. Fails if there is no row, two have
+    /// a name, or the file of the names cannot be read.
+    pub fn choose(&self, beside: Option<&str>) -> Result<Chosen> {
         let rows = if self.all {
             every_row(&self.names.read()?, beside)?
         } else if self.port.is_empty() {
@@ -182,17 +161,13 @@ impl Ports {
 /// The row of a `--port`.
 fn row(machine: &Named, names: &NamesFile) -> Result<Row> {
     let board = names.board(&machine.port)?;
-    let name = match &machine.name {
-        Some(name) => name.clone(),
-        None => end_of(&machine.port),
-    };
+    let name = machine.name.clone().unwrap_or_else(|| end_of(&machine.port));
     if let Some(problem) = wrong_with(&name) {
         bail!("{name:?} cannot be a row's name: {problem}: put one before it, as left={}", machine.port);
     }
     Ok(Row { name, board })
 }
 
-/// The last part of a port's path.
 fn end_of(port: &str) -> String {
     Path::new(port).file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
@@ -239,10 +214,8 @@ impl Chosen {
         })
     }
 
-    /// Prints the failures of the rows' results, with their names.
-    ///
-    /// # Errors
-    /// If a row failed: the only row's own error, or the names of the failed rows.
+    /// Prints the failures of the rows' results, with their names. Fails if a row failed: the only row's own error, or
+    /// the names of the failed rows.
     pub fn check<T>(&self, mut done: Vec<Result<T>>) -> Result<()> {
         if let (false, [_]) = (self.are_several, done.as_slice()) {
             return done.remove(0).map(drop);
@@ -258,20 +231,9 @@ impl Chosen {
         Ok(())
     }
 
-    /// The name of a row's own file, if there may be several rows.
-    pub fn name_in(row: &Row, ending: &str) -> String {
-        format!("{}.{ending}", row.name)
-    }
-
     /// The path of a row's own file, if there may be several rows: in a folder, by the row's name.
     pub fn file_in(folder: &Path, row: &Row, ending: &str) -> PathBuf {
-        folder.join(Self::name_in(row, ending))
-    }
-
-    /// The row of this name.
-    pub fn find(&self, name: &str) -> Result<usize> {
-        let found = self.rows.iter().position(|row| row.name == name);
-        found.with_context(|| format!("there is no row {name}: there are {}", self.names().join(", ")))
+        folder.join(format!("{}.{ending}", row.name))
     }
 
     /// A message about a row, with its name if there may be several.
@@ -290,7 +252,7 @@ mod tests {
     /// The rows at these ports, with the names in a file.
     fn choose(ports: &[&str], file: &Path) -> Result<Chosen> {
         let port = ports.iter().map(|text| named(text).unwrap()).collect();
-        Ports { port, all: false, names: NamesFile { rows_file: Some(file.to_owned()) } }.choose()
+        Ports { port, all: false, names: NamesFile { rows_file: Some(file.to_owned()) } }.choose(None)
     }
 
     fn at(port: &str) -> Board {

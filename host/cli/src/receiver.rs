@@ -2,11 +2,11 @@
 //!
 //! [`gps`] interprets its bytes. A file can replace the port: it is read at the pace of its times.
 
-use crate::numbers::{number_within, whole_within};
-use crate::ports::{Chosen, Named, named};
-use anyhow::{Result, anyhow, bail, ensure};
+use crate::ports::{Chosen, Named, find, named};
+use anyhow::{Error, Result, anyhow, bail, ensure};
 use clap::Args;
 use files::bounded_file;
+use frame::{number_within, whole_within};
 use gps::playback::{self, Piece};
 use gps::recorder::Lines;
 use gps::{Antenna, Recorder};
@@ -79,10 +79,8 @@ impl GpsArguments {
         self.gps.as_ref().map(|gps| gps.port.as_str())
     }
 
-    /// The receiver, if the user named one, and the first lines of the record.
-    ///
-    /// # Errors
-    /// If its row is not recorded, or its port cannot be opened now. A later loss of the port is no error.
+    /// The receiver, if the user named one, and the first lines of the record. Fails if its row is not recorded, or its
+    /// port cannot be opened now. A later loss of the port is no error.
     pub fn open(&self, chosen: &Chosen) -> Result<Option<(Gps, Lines)>> {
         let antenna = self.antenna.over(Antenna::default());
         let Some(Named { name, port }) = &self.gps else {
@@ -93,7 +91,7 @@ impl GpsArguments {
             return Ok(None);
         };
         let row = match name {
-            Some(name) => chosen.find(name)?,
+            Some(name) => find(name, &chosen.names()).map_err(Error::msg)?,
             None if chosen.rows.len() == 1 => 0,
             None => bail!(
                 "with several rows, name the row that records the receiver, as in `--gps {}={port}`",

@@ -1,13 +1,11 @@
 //! `weeder record`: logs the machine's output to a file, or each row's to its own file.
 
 use crate::ctrl_c;
-use crate::destination::{OutName, Replace};
-use crate::output::tell;
 use crate::ports::{Chosen, Ports};
 use crate::receiver::GpsArguments;
 use anyhow::{Result, bail, ensure};
 use clap::Args;
-use gps::recorder::Lines;
+use frame::{OutName, Replace, tell};
 use link::advice;
 use link::rows::{Rows, What};
 use link::session::Happening;
@@ -43,16 +41,13 @@ pub struct Arguments {
 
 /// Records until Ctrl-C.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let chosen = arguments.ports.choose_beside(arguments.gps.port())?;
+    let chosen = arguments.ports.choose(arguments.gps.port())?;
     let gps = arguments.gps.open(&chosen)?;
     let mut logs = Logs::open(&arguments.out, &chosen)?;
-    let mut gps = match gps {
-        Some((receiver, lines)) => {
-            logs.lines_at(receiver.row, logs.now_ms(receiver.row), &lines)?;
-            Some(receiver)
-        }
-        None => None,
-    };
+    if let Some((receiver, lines)) = &gps {
+        logs.write(receiver.row, |log| log.lines_at(log.now_ms(), lines))?;
+    }
+    let mut gps = gps.map(|(receiver, _)| receiver);
     let (rows, _) = open(&chosen)?;
     let stop = ctrl_c()?;
     tell!("Recording into {}, Ctrl-C ends it", arguments.out.display());
@@ -60,7 +55,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         if let Some(gps) = &mut gps {
             let time_ms = logs.now_ms(gps.row);
             let said = gps.turn(time_ms, Instant::now());
-            let written = logs.lines_at(gps.row, time_ms, &said);
+            let written = logs.write(gps.row, |log| log.lines_at(time_ms, &said));
             logs.go_on_after(written, gps.row, &chosen)?;
             for (kind, line) in &said {
                 if let Kind::GpsFound | Kind::GpsLost | Kind::GpsMark = kind {
@@ -70,7 +65,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         }
         let Some(heard) = rows.next(LOOK) else { continue };
         let What::Happened(happening) = heard.what else { continue };
-        let written = logs.write(heard.row, &happening);
+        let written = logs.write(heard.row, |log| log.write(log.now_ms(), &happening));
         logs.go_on_after(written, heard.row, &chosen)?;
         if let Some(gps) = gps.as_mut().filter(|gps| gps.row == heard.row) {
             gps.happened(logs.now_ms(heard.row), &happening);
@@ -96,31 +91,24 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 }
 
 /// Opens all rows, and returns which are connected. With several rows, missing ones are reported and tried again.
-///
-/// # Errors
-/// If no row is connected.
+/// Fails if no row is connected.
 pub fn open(chosen: &Chosen) -> Result<(Rows, Vec<bool>)> {
     let (rows, missing) = Rows::open(chosen.openers());
-    let are_there = missing.iter().map(Option::is_none).collect();
-    let mut missing: Vec<_> = missing.into_iter().enumerate().filter_map(|(row, why)| Some((row, why?))).collect();
-    if missing.len() < rows.count() {
+    let are_there: Vec<bool> = missing.iter().map(Option::is_none).collect();
+    if are_there.contains(&true) {
         return Ok((rows, are_there));
     }
-    if !chosen.are_several
-        && let Some((_, why)) = missing.pop()
-    {
-        return Err(why.into());
-    }
-    for (row, why) in missing {
+    for (row, why) in missing.into_iter().flatten().enumerate() {
+        if !chosen.are_several {
+            return Err(why.into());
+        }
         tell!("{}", chosen.under_name(row, &format!("{:#}", anyhow::Error::from(why))));
     }
     bail!("none of the {} rows is there", rows.count());
 }
 
 /// A log for each row.
-pub struct Logs {
-    logs: Vec<Log>,
-}
+pub struct Logs(Vec<Log>);
 
 struct Log {
     path: PathBuf,
@@ -128,21 +116,8 @@ struct Log {
     is_written: bool,
 }
 
-impl Log {
-    /// Writes, unless it has failed before.
-    fn write(&mut self, work: impl FnOnce(&mut LogWriter) -> Result<(), LogError>) -> Result<(), LogError> {
-        if !self.is_written {
-            return Ok(());
-        }
-        work(&mut self.writer).inspect_err(|_| self.is_written = false)
-    }
-}
-
 impl Logs {
-    /// Opens them all, so that their times begin together.
-    ///
-    /// # Errors
-    /// If one cannot be written, or is something else.
+    /// Opens them all, so that their times begin together. Fails if one cannot be written, or is something else.
     pub fn open(out: &Path, chosen: &Chosen) -> Result<Self> {
         if chosen.are_several {
             // An existing log is continued, so no name is checked.
@@ -151,45 +126,37 @@ impl Logs {
         let path = |row| if chosen.are_several { Chosen::file_in(out, row, "csv") } else { out.to_owned() };
         let paths = chosen.rows.iter().map(path);
         let log = |path: PathBuf| Ok(Log { writer: LogWriter::open(&path)?, path, is_written: true });
-        Ok(Self { logs: paths.map(log).collect::<Result<_, LogError>>()? })
+        Ok(Self(paths.map(log).collect::<Result<_, LogError>>()?))
     }
 
-    /// Writes an event of a row. After a failure its log is not written again.
-    ///
-    /// # Errors
-    /// At the first failure of a log.
-    pub fn write(&mut self, row: usize, happening: &Happening) -> Result<(), LogError> {
-        self.logs[row].write(|writer| writer.write(writer.now_ms(), happening))
+    /// Writes into a row's log. Fails at the first failure of the log, which is not written again.
+    pub fn write(
+        &mut self,
+        row: usize,
+        work: impl FnOnce(&mut LogWriter) -> Result<(), LogError>,
+    ) -> Result<(), LogError> {
+        let log = &mut self.0[row];
+        let written = if log.is_written { work(&mut log.writer) } else { Ok(()) };
+        written.inspect_err(|_| log.is_written = false)
     }
 
     /// The time of a row's line written now, in milliseconds.
     fn now_ms(&self, row: usize) -> u64 {
-        self.logs[row].writer.now_ms()
+        self.0[row].writer.now_ms()
     }
 
-    /// Writes lines of this time into a row's log, as [`Logs::write`].
-    ///
-    /// # Errors
-    /// At the first failure of a log.
-    fn lines_at(&mut self, row: usize, time_ms: u64, lines: &Lines) -> Result<(), LogError> {
-        self.logs[row].write(|writer| writer.lines_at(time_ms, lines))
-    }
-
-    /// Reports a log that could not be written. The other rows' logs continue.
-    ///
-    /// # Errors
-    /// If no log is left.
+    /// Reports a log that could not be written. The other rows' logs continue. Fails if no log is left.
     fn go_on_after(&self, written: Result<(), LogError>, row: usize, chosen: &Chosen) -> Result<()> {
         if let Err(error) = written {
             tell!("error: {}", chosen.under_name(row, &format!("{:#}", anyhow::Error::from(error))));
-            ensure!(self.logs.iter().any(|log| log.is_written), "no log can be written any more");
+            ensure!(self.0.iter().any(|log| log.is_written), "no log can be written any more");
         }
         Ok(())
     }
 
     /// Says what is in them, and fails if one could not be written.
     fn end(&self) -> Result<()> {
-        for Log { path, writer, .. } in &self.logs {
+        for Log { path, writer, .. } in &self.0 {
             tell!("{} lines were added: {} has {} now", writer.added, path.display(), writer.lines());
         }
         self.check()
@@ -197,7 +164,7 @@ impl Logs {
 
     /// Fails if one could not be written.
     pub fn check(&self) -> Result<()> {
-        match self.logs.iter().find(|log| !log.is_written) {
+        match self.0.iter().find(|log| !log.is_written) {
             Some(log) => bail!("{} is not whole: it could not be written", log.path.display()),
             None => Ok(()),
         }

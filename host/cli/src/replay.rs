@@ -1,10 +1,8 @@
 //! `weeder replay`: repeats the decisions of a log on the PC.
 
-use crate::output::say;
-use crate::program::Finding;
-use crate::source;
 use anyhow::{Context, Result};
 use clap::Args;
+use frame::{Finding, say, source};
 use logbook::{log, replay};
 use serde_json::json;
 use std::path::PathBuf;

@@ -1,10 +1,10 @@
 //! `weeder rows`: lists the Unos and the rows that they control, and finds them again at other ports.
 
-use crate::output::say;
 use crate::ports::{NamesFile, unnamed};
 use anyhow::Result;
 use clap::{Args, Subcommand};
 use comfy_table::{Table, presets};
+use frame::say;
 use link::row_names::{Board, Names, Plugged, plugged};
 use serde_json::{Value, json};
 
@@ -125,7 +125,6 @@ fn lines(names: &Names, unos: &[Plugged], exists: impl Fn(&str) -> bool) -> Vec<
     .collect()
 }
 
-/// A board's identification, in words.
 fn described(board: &Board) -> String {
     match board {
         Board::Only { .. } => "the only Uno".to_owned(),
@@ -149,18 +148,10 @@ mod tests {
         }
         let uno = |port: &str, board| Plugged { port: port.to_owned(), board };
         let unos = [uno("ttyACM3", number("A1")), uno("ttyACM4", number("C3")), uno("ttyUSB0", port("ttyUSB0"))];
-        let listed: Vec<(Option<String>, Option<String>)> =
-            lines(&names, &unos, |port| port == "/tmp/uno").into_iter().map(|line| (line.name, line.port)).collect();
-        let text = |text: &str| Some(text.to_owned());
-        assert_eq!(
-            listed,
-            [
-                (text("right"), None),
-                (text("left"), text("ttyACM3")),
-                (text("third"), text("/tmp/uno")),
-                (None, text("ttyACM4")),
-                (None, text("ttyUSB0"))
-            ]
-        );
+        let lines = lines(&names, &unos, |port| port == "/tmp/uno");
+        let listed: Vec<_> = lines.iter().map(|line| (line.name.as_deref(), line.port.as_deref())).collect();
+        let [right, left, third] = ["right", "left", "third"].map(Some);
+        let [first, other, usb] = ["ttyACM3", "ttyACM4", "ttyUSB0"].map(Some);
+        assert_eq!(listed, [(right, None), (left, first), (third, Some("/tmp/uno")), (None, other), (None, usb)]);
     }
 }

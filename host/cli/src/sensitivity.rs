@@ -1,15 +1,12 @@
 //! `weeder sensitivity`: what each assumption of a field costs. Each line changes one assumption, or several that belong
 //! together. All others stay as they are, and so does the seed.
 
-use crate::numbers::{number_within, whole_within};
-use crate::output::say;
-use crate::progress::with_bar;
-use crate::source;
 use anyhow::{Context, Result};
 use clap::Args;
 use comfy_table::CellAlignment;
 use field::conditions::{self, Conditions, PARAMETERS};
 use field::tool_path::Effect;
+use frame::{number_within, say, source, whole_within, with_bar};
 use link::settings::Setting;
 use std::str::FromStr;
 use study::experiment::{Engine, Experiment, Treatment, totals};

@@ -2,11 +2,10 @@
 
 use crate::ctrl_c;
 use crate::inside::INSIDE;
-use crate::numbers::whole_within;
-use crate::output::{say, tell};
 use crate::ports::Ports;
 use anyhow::Result;
 use clap::Args;
+use frame::{say, tell, whole_within};
 use serve::page::Page;
 use serve::{Server, Setup};
 use std::env;
@@ -16,7 +15,6 @@ use std::process::{Command, Stdio};
 use std::sync::Arc;
 use uno_run::firmware;
 
-/// The default TCP port.
 const HTTP_PORT: u16 = 8866;
 
 #[derive(Args)]
@@ -61,12 +59,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         (None, Some(inside)) => Page::of(inside.page),
         (None, None) => Page::read(&firmware::workspace_root().join("page/dist"))?,
     };
-    let lan = match arguments.lan {
-        Some(Some(address)) => Some(address),
-        Some(None) => Some(serve::find_lan()?),
-        None => None,
-    };
-    let chosen = arguments.ports.choose()?;
+    let lan = arguments.lan.map(|address| address.map_or_else(serve::find_lan, Ok)).transpose()?;
+    let chosen = arguments.ports.choose(None)?;
     let server = Server::open(Setup {
         machines: chosen.names().into_iter().zip(chosen.openers()).collect(),
         page,
@@ -88,7 +82,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// Opens an address in the user's browser.
 fn open_in_browser(address: &str) {
     let mut words = match env::consts::OS {
         "macos" => vec!["open"],

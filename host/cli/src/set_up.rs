@@ -9,26 +9,24 @@ mod simulated;
 mod state;
 
 use self::state::State;
-use crate::input;
-use crate::output::{say, tell};
+use crate::input::{self, Line};
 use crate::ports::Port;
-use crate::source;
 use anyhow::{Context, Error, Result};
 use clap::Args;
 use files::{bounded_file, whole_file};
+use frame::{say, source, tell};
 use link::row_names::Board;
 use link::settings::{self, Setting, name, range, unit};
 use link::{ConsoleLine, EventLine, Link, LinkError, Mode};
 use mechanics::design::Design;
-use mechanics::machine::Machine;
+use mechanics::machine::{Input, Machine};
 use mechanics::swing::Swing;
 use mechanics::unit::MM;
 use set_up::{ManualStep, Task, steps};
 use std::fmt;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{self, Receiver, TryRecvError};
-use std::thread;
+use std::sync::mpsc::{Receiver, TryRecvError};
 
 #[derive(Args)]
 #[command(after_help = "\
@@ -57,17 +55,17 @@ pub struct Arguments {
     simulated: bool,
 }
 
-/// The measures from which `weeder design` calculates the stroke: section and key of a machine file, and the question.
-const TOOL_WIDTH: (&str, &str) = ("intra_row", "width");
-const ASKED: [((&str, &str), &str); 8] = [
+/// The measures from which `weeder design` calculates the stroke: the key in a machine file, and the question.
+const TOOL_WIDTH: &str = "intra_row.width";
+const ASKED: [(&str, &str); 8] = [
     (TOOL_WIDTH, "The tool's width"),
-    (("intra_row", "shank_length"), "The arm's length, from the servo's axis to the blade's tip"),
-    (("intra_row", "blade_height"), "The blade's height"),
-    (("intra_row", "servo_torque"), "The servo's greatest torque"),
-    (("swing", "servo_time_60"), "The servo's time for 60 degrees without load"),
-    (("swing", "protected"), "The width round a stem that no tool may enter"),
-    (("swing", "stem_off"), "How far a stem may stand off the middle of its canopy"),
-    (("swing", "room"), "Room beside the stem zone, for plants off the line and a machine that strays"),
+    ("intra_row.shank_length", "The arm's length, from the servo's axis to the blade's tip"),
+    ("intra_row.blade_height", "The blade's height"),
+    ("intra_row.servo_torque", "The servo's greatest torque"),
+    ("swing.servo_time_60", "The servo's time for 60 degrees without load"),
+    ("swing.protected", "The width round a stem that no tool may enter"),
+    ("swing.stem_off", "How far a stem may stand off the middle of its canopy"),
+    ("swing.room", "Room beside the stem zone, for plants off the line and a machine that strays"),
 ];
 
 /// Leads through the steps.
@@ -89,15 +87,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let board = Board::at(&arguments.port.board()?.port()?)?;
     state.take_board(&board, path)?;
     let link = board.open()?;
-    Guide { link, state, machine, typed: typed_lines(), path: path.clone() }.lead()
-}
-
-/// The lines that the user types. The channel ends with the input.
-fn typed_lines() -> Receiver<String> {
-    let (sender, typed) = mpsc::channel();
-    // Reading blocks until the user types, so it has its own thread. The thread ends with the process.
-    thread::spawn(move || input::read(io::stdin().lock(), |line| sender.send(line.text.trim().to_owned()).is_ok()));
-    typed
+    match (Guide { link, state, machine, typed: input::typed(), path: path.clone(), watches: false }).lead() {
+        Err(error) if error.downcast_ref() == Some(&End::Stop) => say!("Stopped. The same command continues here."),
+        ended => ended,
+    }
 }
 
 /// How the user ends a step early.
@@ -113,26 +106,18 @@ impl fmt::Display for End {
     }
 }
 
-/// Leads the user through the steps.
 struct Guide {
     link: Link,
     state: State,
     machine: Option<Machine>,
-    typed: Receiver<String>,
+    typed: Receiver<Line>,
     path: PathBuf,
+    /// Whether detections are printed while a question waits.
+    watches: bool,
 }
 
 impl Guide {
     fn lead(mut self) -> Result<()> {
-        match self.lead_to_the_end() {
-            Err(error) if error.downcast_ref() == Some(&End::Stop) => {
-                say!("Stopped. The same command continues here.")
-            }
-            ended => ended,
-        }
-    }
-
-    fn lead_to_the_end(&mut self) -> Result<()> {
         if settings::status(&mut self.link)?.mode == Mode::Alarm {
             // A new board has no saved settings, which is an alarm. This saves the present ones.
             self.link.ask("save")?;
@@ -152,13 +137,12 @@ impl Guide {
                 continue;
             }
             say!("\nStep {number} of {count}: {title}\n  {how}")?;
-            match self.step(tasks) {
-                Ok(()) => {}
-                Err(error) if error.downcast_ref() == Some(&End::LeaveOut) => {
-                    say!("  Left out.")?;
-                    continue;
+            if let Err(error) = self.step(tasks) {
+                if error.downcast_ref() != Some(&End::LeaveOut) {
+                    return Err(error);
                 }
-                Err(error) => return Err(error),
+                say!("  Left out.")?;
+                continue;
             }
             match self.open(tasks)? {
                 None => self.state.done.insert(*number),
@@ -181,11 +165,9 @@ impl Guide {
     fn compare(&mut self) -> Result<()> {
         let on_board = settings::read(&mut self.link)?;
         let kept = std::mem::replace(&mut self.state.measured.settings, on_board.clone());
-        let differing: Vec<Setting> = match self.path.exists() && !self.state.done.is_empty() {
-            true => Setting::all().filter(|&setting| on_board.get(setting) != kept.get(setting)).collect(),
-            false => Vec::new(),
-        };
-        if differing.is_empty() {
+        let differs = |&setting: &Setting| on_board.get(setting) != kept.get(setting);
+        let differing: Vec<Setting> = Setting::all().filter(differs).collect();
+        if differing.is_empty() || !self.path.exists() || self.state.done.is_empty() {
             return Ok(());
         }
         say!("The board does not have the settings of {}:", self.path.display())?;
@@ -217,22 +199,16 @@ impl Guide {
         if let Some(warning) = self.state.measured.warning(&settings) {
             say!("  Warning: {warning}")?;
         }
-        match self.tool_width_mm() {
-            Some(width_mm) => match simulated::expected(&settings, width_mm) {
-                Ok(expected) => say!("  Expected: {expected}")?,
-                Err(error) => say!("  Expected: not calculated, because {error:#}")?,
-            },
-            None => say!("  Expected: not calculated, because the tool's width was not given in step 3")?,
-        }
+        let width_mm = self.tool_width_mm().context("the tool's width was not given in step 3");
+        let expected = width_mm.and_then(|width_mm| simulated::expected(&settings, width_mm));
+        say!("  Expected: {}", expected.unwrap_or_else(|error| format!("not calculated, because {error:#}")))?;
         say!("  The measurements are in {}.", self.path.display())?;
         say!("  Next, read docs/work.md (in a release: manual/docs/work.md).")
     }
 
     fn tool_width_mm(&self) -> Option<f64> {
-        let (section, key) = TOOL_WIDTH;
-        let is_width = |input: &mechanics::machine::Input| (input.section, input.key) == TOOL_WIDTH;
-        let of_machine = self.machine.and_then(|machine| machine.inputs().into_iter().find(is_width));
-        of_machine.map(|input| input.value).or_else(|| self.state.asked.get(&format!("{section}.{key}")).copied())
+        let of_machine = self.machine.and_then(|machine| input(&machine, TOOL_WIDTH));
+        of_machine.map(|input| input.value).or_else(|| self.state.asked.get(TOOL_WIDTH).copied())
     }
 
     fn keep(&self) -> Result<()> {
@@ -240,8 +216,13 @@ impl Guide {
             .with_context(|| format!("{} cannot be written", self.path.display()))
     }
 
-    /// Asks for a line. Enter takes `shown`. `seen` gets the machine's lines meanwhile.
-    fn line(&mut self, question: &str, shown: Option<&str>, seen: impl Fn(&str) -> Result<()>) -> Result<String> {
+    /// Asks until `parse` takes the answer; it fails with what would be right. Enter takes `shown`.
+    fn ask_for<T>(
+        &mut self,
+        question: &str,
+        shown: Option<&str>,
+        parse: impl Fn(&str) -> Result<T, String>,
+    ) -> Result<T> {
         loop {
             let mut out = io::stdout().lock();
             write!(out, "  {question}{}: ", shown.map(|shown| format!(" [{shown}]")).unwrap_or_default())?;
@@ -253,30 +234,34 @@ impl Guide {
                     Err(TryRecvError::Disconnected) => return Err(Error::msg(End::Stop)),
                     // Waits a fiftieth of a second for a line of the machine.
                     Err(TryRecvError::Empty) => {
-                        self.link.next_line()?.as_deref().map_or(Ok(()), &seen)?;
+                        if let (Some(line), true) = (self.link.next_line()?, self.watches)
+                            && let ConsoleLine::Event(EventLine::Detection { .. }) = ConsoleLine::parse(&line)
+                        {
+                            say!("\n    {line}")?;
+                        }
                     }
                 }
             };
-            match (typed.as_str(), shown) {
+            let answer = match (typed.text.trim(), shown) {
                 ("s", _) => return Err(Error::msg(End::LeaveOut)),
                 ("q", _) => return Err(Error::msg(End::Stop)),
-                ("", Some(shown)) => return Ok(shown.to_owned()),
-                ("", None) => tell!("  error: type the value, s or q"),
-                _ => return Ok(typed),
+                ("", None) => Err("type the value, s or q".to_owned()),
+                ("", Some(shown)) => parse(shown),
+                (typed, _) => parse(typed),
+            };
+            match answer {
+                Ok(answer) => return Ok(answer),
+                Err(right) => tell!("  error: {right}"),
             }
         }
     }
 
-    fn ask_for(&mut self, question: &str, shown: Option<&str>) -> Result<String> {
-        self.line(question, shown, |_| Ok(()))
-    }
-
     /// Waits until the user goes on.
     fn go(&mut self, question: &str) -> Result<()> {
-        while self.ask_for(question, Some("go on"))? != "go on" {
-            tell!("  error: type Enter, s or q");
-        }
-        Ok(())
+        self.ask_for(question, Some("go on"), |typed| match typed {
+            "go on" => Ok(()),
+            _ => Err("type Enter, s or q".to_owned()),
+        })
     }
 
     fn step(&mut self, tasks: &[Task]) -> Result<()> {
@@ -305,13 +290,10 @@ impl Guide {
 
     /// Shows the detections as they come.
     fn watch(&mut self) -> Result<()> {
-        let is_detection =
-            |line: &str| matches!(ConsoleLine::parse(line), ConsoleLine::Event(EventLine::Detection { .. }));
-        let show = |line: &str| if is_detection(line) { say!("\n    {line}") } else { Ok(()) };
-        while self.line("The lines come here. When each plant gives one", Some("go on"), show)? != "go on" {
-            tell!("  error: type Enter, s or q");
-        }
-        Ok(())
+        self.watches = true;
+        let ended = self.go("The lines come here. When each plant gives one");
+        self.watches = false;
+        ended
     }
 
     /// The stroke, leads and zone that follow from the user's arm, tool and servo. Empty if the user types them.
@@ -320,11 +302,11 @@ impl Guide {
             Some(machine) => machine,
             None => {
                 let question = "Calculate them from your arm, tool and servo, or type them: yes, no";
-                if self.ask_for(question, Some("yes"))? != "yes" {
+                if !self.ask_for(question, Some("yes"), |typed| Ok(typed == "yes"))? {
                     return Ok(Vec::new());
                 }
-                for (input, question) in ASKED {
-                    self.measure(input, question)?;
+                for (name, question) in ASKED {
+                    self.measure(name, question)?;
                 }
                 let text: String = self.state.asked.iter().map(|(key, value)| written(key, *value)).collect();
                 mechanics::file::parse(Path::new("the machine"), &text)?
@@ -354,23 +336,15 @@ impl Guide {
     }
 
     /// Asks for a measure of the machine.
-    fn measure(&mut self, (section, key): (&str, &str), question: &str) -> Result<()> {
-        let inputs = Machine::default().inputs();
-        let Some(input) = inputs.iter().find(|input| (input.section, input.key) == (section, key)) else {
-            return Ok(());
-        };
-        let name = format!("{section}.{key}");
-        let before = self.state.asked.get(&name).map(f64::to_string);
-        loop {
-            let typed = self.ask_for(&format!("{question}, in {}", input.unit), before.as_deref())?;
-            match typed.parse().ok().filter(|value| (input.least..=input.most).contains(value)) {
-                Some(value) => {
-                    self.state.asked.insert(name, value);
-                    return self.keep();
-                }
-                None => tell!("  error: it has to be a number {}", input.range()),
-            }
-        }
+    fn measure(&mut self, name: &str, question: &str) -> Result<()> {
+        let Some(input) = input(&Machine::default(), name) else { return Ok(()) };
+        let before = self.state.asked.get(name).map(f64::to_string);
+        let value = self.ask_for(&format!("{question}, in {}", input.unit), before.as_deref(), |typed| {
+            let value = typed.parse().ok().filter(|value| (input.least..=input.most).contains(value));
+            value.ok_or_else(|| format!("it has to be a number {}", input.range()))
+        })?;
+        self.state.asked.insert(name.to_owned(), value);
+        self.keep()
     }
 
     /// Sets and saves.
@@ -392,13 +366,10 @@ impl Guide {
             question += &format!(", now {now}");
         }
         let shown = offered.unwrap_or(now).to_string();
-        loop {
-            let typed = self.ask_for(&question, Some(&shown))?;
-            match typed.parse().ok().filter(|value| (range_of.least..=range_of.greatest).contains(value)) {
-                Some(value) => return Ok(value),
-                None => tell!("  error: {} has to be a whole number, {}", name(setting), range(setting)),
-            }
-        }
+        self.ask_for(&question, Some(&shown), |typed| {
+            let value = typed.parse().ok().filter(|value| (range_of.least..=range_of.greatest).contains(value));
+            value.ok_or_else(|| format!("{} has to be a whole number, {}", name(setting), range(setting)))
+        })
     }
 
     /// Types a command. `None` if the machine refuses it; the reason was printed.
@@ -414,8 +385,13 @@ impl Guide {
     }
 }
 
+/// A machine's value of this key of its file.
+fn input(machine: &Machine, name: &str) -> Option<Input> {
+    machine.inputs().into_iter().find(|input| format!("{}.{}", input.section, input.key) == name)
+}
+
 /// A measure as a line of a machine file.
 fn written(name: &str, value: f64) -> String {
-    let unit = Machine::default().inputs().into_iter().find(|input| format!("{}.{}", input.section, input.key) == name);
-    unit.map_or_else(String::new, |input| format!("{name} = \"{value} {}\"\n", input.unit))
+    let input = input(&Machine::default(), name);
+    input.map_or_else(String::new, |input| format!("{name} = \"{value} {}\"\n", input.unit))
 }

@@ -1,14 +1,11 @@
 //! `weeder settings`: saves the machine's settings to a file, compares them, and sends them to a machine.
 
-use crate::destination::{OutFolder, OutName, Replace};
-use crate::output::say;
 use crate::ports::{Chosen, Ports};
-use crate::program::Finding;
-use crate::source;
 use anyhow::{Result, ensure};
 use clap::{Args, Subcommand};
 use comfy_table::{Table, presets};
 use field::conditions::Conditions;
+use frame::{Finding, OutFolder, OutName, Replace, say, source};
 use link::row_names::Row;
 use link::settings::{self, Setting, SettingsError, Shown, name, unit};
 use link::settings_file::{self, Named};
@@ -81,14 +78,14 @@ Example: weeder settings push machine.toml --port /dev/ttyACM0")]
 /// Pulls, pushes or compares.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     match &arguments.action {
-        Action::Pull { file, replace, json, ports } => pull(file.as_ref(), *replace, *json, &ports.choose()?),
-        Action::Push { file, no_save, save: _, json, ports } => push(file, !no_save, *json, &ports.choose()?),
-        Action::Diff { file, json, ports } => diff(file, *json, &ports.choose()?),
+        Action::Pull { file, replace, json, ports } => pull(file.as_ref(), *replace, *json, &ports.choose(None)?),
+        Action::Push { file, no_save, save: _, json, ports } => push(file, !no_save, *json, &ports.choose(None)?),
+        Action::Diff { file, json, ports } => diff(file, *json, &ports.choose(None)?),
     }
 }
 
 fn pull(file: Option<&OutName>, replace: Replace, json: bool, chosen: &Chosen) -> Result<Finding> {
-    let names = chosen.rows.iter().map(|row| Chosen::name_in(row, "toml"));
+    let names = chosen.rows.iter().map(|row| format!("{}.toml", row.name));
     let folder = match file {
         Some(file) if chosen.are_several => Some(file.folder(names, replace)?),
         Some(file) => file.file(replace).map(|_| None)?,
@@ -176,11 +173,9 @@ impl Chosen {
         }
     }
 
-    /// Prints the rows' results, each in words, or all in JSON: the only row's value, or each row's by its name. A failed
-    /// row has `null`, but if the only row has failed, there is only its error.
-    ///
-    /// # Errors
-    /// If a row failed, or the results cannot be printed.
+    /// Prints the rows' results, each in words, or all in JSON: the only row's value, or each row's by its name. A
+    /// failed row has `null`, but if the only row has failed, there is only its error. Fails if a row failed, or the
+    /// results cannot be printed.
     fn show<T>(
         &self,
         done: Vec<Result<T>>,
@@ -232,8 +227,8 @@ fn differences(wanted: &Named, found: &Shown) -> Result<Vec<Difference>, Setting
     }
     for foreign in &wanted.foreign {
         let own = found.takes(foreign)?;
-        let [file, machine] = [foreign.value, own.value].map(|number| value(own.is_switched, number));
-        differences.push((own.name.clone(), file, machine, own.unit.clone()));
+        let value = |number| value(own.is_switched, number);
+        differences.push((own.name.clone(), value(foreign.value), value(own.value), own.unit.clone()));
     }
     differences.retain(|(_, file, machine, _)| file != machine);
     Ok(differences)

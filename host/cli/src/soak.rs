@@ -1,16 +1,12 @@
 //! `weeder soak`: hours of the decisions and minutes of the real firmware, with random faults.
 
-use crate::destination::{OutName, Replace};
-use crate::numbers::whole_within;
-use crate::output::{say, tell};
 use crate::part::{self, Part};
-use crate::program::Finding;
-use crate::progress::{Show, with_bar};
 use anyhow::{Result, ensure};
 use clap::Args;
+use frame::{Finding, OutName, Replace, Show, say, tell, whole_within, with_bar};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use soak::{Plan, SoakError, Tally};
+use soak::{Plan, SoakError, Subject, Tally};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use study::shard::{Numbered, Shard};
@@ -87,13 +83,12 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     if let Some(part) = part {
         return write_part(&study, elf.as_deref(), part);
     }
-    let mut stages = Vec::new();
-    if hours > 0 {
-        stages.push(Stage::of(DECISIONS, json, |show| soak::hours(study.plan(), hours.into(), show))?);
-    }
-    if let Some(elf) = &elf {
-        stages.push(Stage::of(FIRMWARE, json, |show| soak::minutes(study.plan(), uno_minutes.into(), elf, show))?);
-    }
+    let decisions = (hours > 0).then_some((DECISIONS, Subject::Decisions, hours));
+    let firmware = elf.as_deref().map(|elf| (FIRMWARE, Subject::Firmware(elf), uno_minutes));
+    let stages = decisions.into_iter().chain(firmware).map(|(title, subject, parts)| {
+        Stage::of(title, json, |show| soak::run(study.plan(), subject, parts.into(), show))
+    });
+    let stages = stages.collect::<Result<Vec<_>>>()?;
     conclude(&study, &stages, json)
 }
 
@@ -106,10 +101,11 @@ fn write_part(study: &Study, elf: Option<&Path>, part: Part) -> Result<Finding> 
     let tallies = with_bar("soaking", |show| {
         let tally = |(number, begun)| {
             let show = |share: f64| show((f64::from(begun) + share) / count);
-            let outcome = match elf {
-                Some(elf) if number >= hours => soak::minute(study.plan(), number - hours, elf, show)?,
-                _ => soak::hour(study.plan(), number, show)?,
+            let (subject, part) = match elf {
+                Some(elf) if number >= hours => (Subject::Firmware(elf), number - hours),
+                _ => (Subject::Decisions, number),
             };
+            let outcome = soak::part(study.plan(), subject, (part, 1.0), show)?;
             show(1.0);
             Ok(Numbered { number, outcome })
         };
@@ -152,7 +148,6 @@ type Title = (&'static str, &'static str);
 const DECISIONS: Title = ("decisions", "The decision core on the host");
 const FIRMWARE: Title = ("firmware", "The firmware on the virtual Uno");
 
-/// A stage of a soak, and its result.
 struct Stage {
     title: Title,
     tally: Tally,

@@ -1,16 +1,16 @@
 //! `weeder sweep`: a result of the simulated trial against one or two of its parameters.
 
-use crate::destination::{OutFile, OutName, Replace};
-use crate::numbers::{number_within, whole_within};
-use crate::output::{print, say, tell};
 use crate::part::{Part, Shown};
-use crate::progress::with_bar;
-use crate::source::{self, offering};
 use anyhow::Result;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use comfy_table::Table;
+use comfy_table::{ContentArrangement, Table, presets};
 use field::conditions::{self, Conditions, PARAMETERS};
+use frame::{
+    OutFile, OutName, Replace, number_within, print, say,
+    source::{self, offering},
+    tell, whole_within, with_bar,
+};
 use link::settings::{self, Setting};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
@@ -24,10 +24,8 @@ use uno_run::report::number_table;
 /// The name of the command in its parts.
 pub const COMMAND: &str = "sweep";
 
-/// The default result.
 const RESULT: &str = RESULTS[0];
 
-/// The examples in the help.
 const EXAMPLES: &str = "\
 Examples:
   weeder sweep --x lead_out_ms=0..300:20 --y speed=1..4:0.5
@@ -38,28 +36,17 @@ Examples:
   weeder sweep --x k=1..9:2 --shard 2/4 --out 2.part      the second of four parts, for `weeder merge`
 An axis is `speed` in km/h, `spacing` in cm, a parameter of the field as in its TOML file, or a setting of the firmware.";
 
-/// Columns of the help.
-const HELP_WIDTH: usize = 100;
+const HELP_WIDTH: u16 = 100;
 
 /// The examples, and all possible axes.
 fn long_help() -> String {
-    let lines = axes();
-    let [name_width, range_width] = [0, 1].map(|part| lines.iter().map(|line| line[part].len()).max().unwrap_or(0));
-    let mut text = format!("{EXAMPLES}\n\nWhat an axis can be:\n");
-    for [name, range, meaning] in &lines {
-        let begin = format!("  {name:<name_width$}  {range:<range_width$}  ");
-        let mut line = begin.clone();
-        for word in meaning.split(' ') {
-            if line.len() + word.len() > HELP_WIDTH {
-                // Writing to a String cannot fail.
-                let _ = writeln!(text, "{}", line.trim_end());
-                line = " ".repeat(begin.len());
-            }
-            line += &format!("{word} ");
-        }
-        let _ = writeln!(text, "{}", line.trim_end());
+    let mut table = Table::new();
+    table.set_content_arrangement(ContentArrangement::Dynamic).set_width(HELP_WIDTH);
+    table.load_style(presets::NOTHING).add_rows(axes());
+    for column in table.column_iter_mut() {
+        column.set_padding((2, 0));
     }
-    text
+    format!("{EXAMPLES}\n\nWhat an axis can be:\n{}\n", table.trim_fmt())
 }
 
 /// All possible axes: the name, the range and the meaning of each.
@@ -84,7 +71,6 @@ fn axis() -> impl TypedValueParser<Value = Axis> {
     offering(|| NAMES.iter().map(String::as_str).collect(), |text: &str| text.parse::<Axis>())
 }
 
-/// A controller by its name.
 fn controller() -> impl TypedValueParser<Value = Treatment> {
     let ideal = PossibleValue::new("ideal").alias("all-knowing");
     let names = ["firmware", "without-look-ahead", "paper"].map(PossibleValue::new);
@@ -202,11 +188,9 @@ fn in_words(result: &str, sweep: &Sweep, points: &[Point]) -> String {
 
 /// The field, seed, speed, spacing and controller of a sweep.
 fn about(sweep: &Sweep) -> String {
-    let axes = [Some(&sweep.x), sweep.y.as_ref()].into_iter().flatten();
-    let swept: Vec<&str> = axes.map(|axis| axis.parameter.as_str()).collect();
     let mut text = format!("Field {}, seed {}", sweep.field, sweep.seed);
     for (name, value, unit) in [("speed", sweep.speed_km_h, "km/h"), ("spacing", sweep.spacing_cm, "cm")] {
-        if !swept.contains(&name) {
+        if !columns(sweep).any(|column| column == name) {
             let _ = write!(text, ", {value} {unit}");
         }
     }
@@ -253,7 +237,6 @@ fn grid(sweep: &Sweep, y: &Axis, points: &[Point], result: &str) -> Table {
     table
 }
 
-/// The unit of a result.
 fn unit_of(result: &str) -> &'static str {
     if result == "performance_index" { "ha %²/(h hp)" } else { "%" }
 }
@@ -288,27 +271,6 @@ fn write(out: &OutFile, sweep: &Sweep, points: &[Point]) -> Result<()> {
             writer
                 .write_record(values.map(|value| if value.is_finite() { value.to_string() } else { String::new() }))?;
         }
-        Ok::<(), csv::Error>(writer.flush()?)
+        Ok(writer.flush()?)
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_help_separates_an_axis_s_name_range_and_meaning() {
-        let help = long_help();
-        let (_, list) = help.split_once("What an axis can be:\n").expect("there is a list");
-        // The meaning goes on in the next line, below its beginning.
-        let at = list.lines().next().and_then(|line| line.rfind("  ")).expect("it has three columns");
-        let mut entries = 0;
-        for line in list.lines() {
-            let (begin, meaning) = line.split_at(at + 2);
-            let columns = begin.split("  ").filter(|part| !part.trim().is_empty()).count();
-            assert!(line.len() <= HELP_WIDTH && !meaning.starts_with(' ') && [0, 2].contains(&columns), "{line:?}");
-            entries += columns / 2;
-        }
-        assert_eq!(entries, axes().len());
-    }
 }

@@ -1,13 +1,14 @@
 //! `weeder train`: trains an example table from labelled detections, and reports how well it separates plants from
 //! weeds.
 
-use crate::destination::{OutFile, OutName, Replace, write_if_asked};
-use crate::numbers::whole_within;
-use crate::output::{say, tell};
-use crate::source::{self, offering};
 use anyhow::{Result, bail, ensure};
 use clap::builder::TypedValueParser;
 use clap::{ArgGroup, Args};
+use frame::{
+    OutFile, OutName, Replace, say,
+    source::{self, offering},
+    tell, whole_within, write_if_asked,
+};
 use link::examples::CAPACITY;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -73,7 +74,6 @@ fn crop() -> impl TypedValueParser<Value = &'static Crop> {
     offering(|| CROPS.iter().map(|crop| crop.name).collect(), find_crop)
 }
 
-/// A crop by its name.
 fn find_crop(name: &str) -> Result<&'static Crop, String> {
     CROPS.iter().find(|crop| crop.name == name).ok_or_else(|| {
         let names: Vec<&str> = CROPS.iter().map(|crop| crop.name).collect();
@@ -112,10 +112,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let is_rust = table.as_ref().is_some_and(|table| is_rust(table.path()));
     write_if_asked(table.as_ref(), "Table", arguments.json, |to| match is_rust {
         true => Ok(to.write_all(listing::rust(&training, &arguments.command()).as_bytes())?),
-        false => listing::write_csv(&training.kept, to),
+        false => Ok(listing::write_csv(&training.kept, to)?),
     })?;
     write_if_asked(picture.as_ref(), "Picture", arguments.json, |to| {
-        svg::write(to, &regions::draw(&training, &objects))
+        Ok(svg::write(to, &regions::draw(&training, &objects))?)
     })?;
     printed
 }
@@ -173,7 +173,7 @@ fn beside(arguments: &Arguments, table: Option<&OutFile>, objects: &[Labelled]) 
             chosen.len()
         ),
     };
-    write_if_asked(table, "Table", arguments.json, |to| listing::write_csv(&chosen, to))?;
+    write_if_asked(table, "Table", arguments.json, |to| Ok(listing::write_csv(&chosen, to)?))?;
     printed
 }
 

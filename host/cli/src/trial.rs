@@ -6,17 +6,12 @@ mod tables;
 use self::summary::{about, against_the_paper, summary};
 use self::tables::Contents::{Brief, Ground, Plants};
 use self::tables::{LOSS_BUDGET, by_speed, loss_budget};
-use crate::destination::{OutFolder, OutName, Replace};
 use crate::examples;
-use crate::numbers::{number_within, whole_within};
-use crate::output::{say, tell};
 use crate::part::{self, Part, Shown};
-use crate::program::Finding;
-use crate::progress::with_bar;
-use crate::source;
 use anyhow::{Result, ensure};
 use clap::{Args, Command, FromArgMatches, ValueEnum};
 use field::conditions::{self, presets};
+use frame::{Finding, OutFolder, OutName, Replace, number_within, say, source, tell, whole_within, with_bar};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -130,13 +125,10 @@ enum Baseline {
 impl Arguments {
     /// The firmware and its baselines, in the order in which they are shown.
     fn controllers(&self) -> Vec<Treatment> {
-        let takes_part = |controller: &Treatment| match controller {
-            Treatment::Firmware => true,
-            Treatment::WithoutLookAhead => self.baselines.contains(&Baseline::Queue),
-            Treatment::Paper => self.baselines.contains(&Baseline::Paper),
-            Treatment::Ideal => self.baselines.contains(&Baseline::Ideal),
-        };
-        Treatment::ALL.into_iter().filter(takes_part).collect()
+        let baselines = [Baseline::Queue, Baseline::Paper, Baseline::Ideal].into_iter();
+        let all = baselines.zip([Treatment::WithoutLookAhead, Treatment::Paper, Treatment::Ideal]);
+        let asked = all.filter(|(name, _)| self.baselines.contains(name)).map(|(_, controller)| controller);
+        [Treatment::Firmware].into_iter().chain(asked).collect()
     }
 
     /// The command that gives the same result: its options that differ from the defaults, in a fixed order.
@@ -199,7 +191,6 @@ pub struct PlotPart {
     picture: Option<String>,
 }
 
-/// The files of a report.
 const REPORT: [&str; 3] = ["report.html", "trial.csv", "controllers.csv"];
 
 /// Runs it and prints the result, or writes a part of it.
@@ -346,9 +337,9 @@ fn write_report(
     };
     let html = page.html()?;
     let [report, plots, controllers] = REPORT;
-    folder.write(report, |to| to.write_all(html.as_bytes()))?;
-    folder.write(plots, |to| experiment::write_csv(outcomes, &[Treatment::Firmware], to))?;
-    folder.write(controllers, |to| experiment::write_csv(outcomes, &experiment.controllers, to))
+    folder.write(report, |to| Ok(to.write_all(html.as_bytes())?))?;
+    folder.write(plots, |to| Ok(experiment::write_csv(outcomes, &[Treatment::Firmware], to)?))?;
+    folder.write(controllers, |to| Ok(experiment::write_csv(outcomes, &experiment.controllers, to)?))
 }
 
 fn in_json(outcome: &PlotOutcome) -> Value {

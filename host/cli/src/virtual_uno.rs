@@ -1,17 +1,14 @@
 //! `weeder virtual-uno`: an Uno without an Uno, at a pseudo terminal that any serial program opens.
 
-use crate::course::CourseArguments;
 use crate::ctrl_c;
 use crate::flash;
 use crate::input;
-use crate::numbers::{number_within, whole_within};
-use crate::output::{say, tell};
 use anyhow::{Result, anyhow, ensure};
 use clap::Args;
 use field::machine::Machine;
 use field::motion::mm_s;
+use frame::{CourseArguments, number_within, say, tell, whole_within};
 use gps::simulated::{ReceiverSetup, SimulatedReceiver, Trouble};
-use std::io;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver};
@@ -150,7 +147,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     });
     let stop = ctrl_c()?;
 
-    let of_row = |path: &Option<PathBuf>, row: usize| path.as_ref().map(|path| of_row(path, row, count));
+    let of_row = |path: &Option<PathBuf>, row| path.as_deref().map(|path| of_row(path, row, count));
     let setup = |(row, course)| Setup {
         elf: elf.clone(),
         bootloader: bootloader.clone(),
@@ -187,26 +184,25 @@ const RUN_MM: RangeInclusive<u16> = 1000..=60_000;
 /// The runs that are typed into this terminal.
 fn typed_runs() -> Receiver<Run> {
     let (asked, runs) = mpsc::channel();
-    // Reading blocks until a person types, so it has its own thread. The thread ends with the process.
     thread::spawn(move || {
-        input::read(io::stdin().lock(), |line| {
+        for line in input::typed() {
             let run = match line.text.trim() {
                 "" => Some(Run::AlongRow),
                 typed => typed.parse().ok().filter(|mm| RUN_MM.contains(mm)).map(|mm| Run::OverGround(mm.into())),
             };
-            let Some(run) = run else {
-                tell!("error: type Enter, or millimetres from {} to {}", RUN_MM.start(), RUN_MM.end());
-                return true;
-            };
-            asked.send(run).is_ok()
-        });
+            match run.map(|run| asked.send(run)) {
+                Some(Ok(())) => {}
+                Some(Err(_)) => return,
+                None => tell!("error: type Enter, or millimetres from {} to {}", RUN_MM.start(), RUN_MM.end()),
+            }
+        }
     });
     runs
 }
 
 /// The next command to type. An Uno with only a bootloader needs a firmware.
 fn next_command(ports: &[&Path], bootloader: Option<&Bootloader>) -> Result<String> {
-    let is_old = |bootloader: &Bootloader| usize::from(bootloader.start()) == flash::OLD_AVAILABLE_BYTES;
+    let is_old = |bootloader: &Bootloader| usize::from(bootloader.start()) == flash::OLD.available;
     let (begin, ports): (&[&str], _) = match bootloader {
         None => (&["weeder", "monitor"], ports),
         // One at a time.
@@ -220,11 +216,10 @@ fn next_command(ports: &[&Path], bootloader: Option<&Bootloader>) -> Result<Stri
 
 /// A row's own file or link. Its name ends with the row's number if there are several rows.
 fn of_row(path: &Path, row: usize, count: usize) -> PathBuf {
-    if count == 1 {
-        return path.to_owned();
-    }
     let mut name = path.as_os_str().to_owned();
-    name.push((row + 1).to_string());
+    if count > 1 {
+        name.push((row + 1).to_string());
+    }
     name.into()
 }
 

@@ -1,7 +1,6 @@
 //! Arguments that several commands share: the row, and the machine that rolls along it.
 
-use crate::numbers::{number_within, whole_within};
-use crate::source;
+use crate::{number_within, source, whole_within};
 use anyhow::{Result, ensure};
 use clap::Args;
 use field::conditions::{self, Conditions};
@@ -55,10 +54,8 @@ const SPACING_SCATTER: f64 = 0.08;
 const CANOPY_SCATTER: f64 = 0.15;
 
 impl CourseArguments {
-    /// The row of this number, read or grown. Each random row has other plants.
-    ///
-    /// # Errors
-    /// If the file is wrong, or the numbers make no row.
+    /// The row of this number, read or grown. Each random row has other plants. Fails if the file is wrong, or the
+    /// numbers make no row.
     pub fn nth_row(&self, number: u64) -> Result<Row> {
         let seed = self.seed.wrapping_add(number);
         if let Some(path) = &self.row {
@@ -95,10 +92,8 @@ impl CourseArguments {
         }
     }
 
-    /// The machine and what is around it, in this field.
-    ///
-    /// # Errors
-    /// If it is no field, or its machine has no room for the distance from beam to tool.
+    /// The machine and what is around it, in this field. Fails if it is no field, or its machine has no room for the
+    /// distance from beam to tool.
     pub fn conditions_of(&self, field: &str) -> Result<Conditions> {
         let mut conditions = source::field(field)?;
         if let Some(beam_to_tool_mm) = self.beam_to_tool {

@@ -9,13 +9,13 @@
 //! So no command replaces a file without [`Replace`], the option `--force`. A test in `main.rs` checks every argument
 //! that names an output.
 
-use crate::output::say;
-use anyhow::{Context, Error, Result, bail, ensure};
+use crate::say;
+use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use files::whole_file;
 use std::ffi::OsString;
 use std::fs;
-use std::io::{self, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Endings of files that commands write. A folder's name hardly ends so.
@@ -65,9 +65,6 @@ impl From<OsString> for OutName {
 
 impl OutName {
     /// Checks that a file of this name can be written without losing a file.
-    ///
-    /// # Errors
-    /// If it could not, and why.
     pub fn file(&self, replace: Replace) -> Result<OutFile> {
         ensure!(!self.0.is_dir(), "{} is a folder: name a file", self.0.display());
         replace.check(&self.0)?;
@@ -76,9 +73,6 @@ impl OutName {
     }
 
     /// Checks that files of these names can be written into a folder of this name without losing a file.
-    ///
-    /// # Errors
-    /// If they could not, and why.
     pub fn folder<N: Into<String>>(&self, names: impl IntoIterator<Item = N>, replace: Replace) -> Result<OutFolder> {
         let folder = &self.0;
         ensure!(!folder.exists() || folder.is_dir(), "{} is a file: name a folder", folder.display());
@@ -104,14 +98,8 @@ impl OutName {
 
 impl OutFile {
     /// Writes it whole, or leaves what was there.
-    ///
-    /// # Errors
-    /// If it cannot be written.
-    pub fn write<E>(&self, contents: impl FnOnce(&mut dyn Write) -> Result<(), E>) -> Result<()>
-    where
-        E: From<io::Error> + Into<Error>,
-    {
-        whole_file::write(&self.0, contents).map_err(|error| error.into().context(cannot_be_written(&self.0)))
+    pub fn write(&self, contents: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
+        whole_file::write(&self.0, contents).with_context(|| cannot_be_written(&self.0))
     }
 
     /// The name.
@@ -122,21 +110,12 @@ impl OutFile {
 
 impl OutFolder {
     /// Makes the folder if necessary.
-    ///
-    /// # Errors
-    /// If it cannot be made.
     pub fn make(&self) -> Result<()> {
         fs::create_dir_all(&self.folder).with_context(|| format!("the folder {} cannot be made", self.folder.display()))
     }
 
-    /// Writes a whole file there, or leaves the old file. Makes the folder if necessary.
-    ///
-    /// # Errors
-    /// If folder or file cannot be written, or this name was not checked.
-    pub fn write<E>(&self, name: &str, contents: impl FnOnce(&mut dyn Write) -> Result<(), E>) -> Result<()>
-    where
-        E: From<io::Error> + Into<Error>,
-    {
+    /// Writes a whole file there, or leaves the old file. Makes the folder if necessary. The name has to be a checked one.
+    pub fn write(&self, name: &str, contents: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
         ensure!(self.names.iter().any(|checked| checked == name), "{name} was not checked before it was written");
         self.make()?;
         OutFile(self.folder.join(name)).write(contents)
@@ -149,18 +128,12 @@ impl OutFolder {
 }
 
 /// Writes a file that the user asked for, and prints its name behind a title, unless the output is JSON.
-///
-/// # Errors
-/// If it cannot be written, or its name not be printed.
-pub fn write_if_asked<E>(
+pub fn write_if_asked(
     file: Option<&OutFile>,
     title: &str,
     json: bool,
-    contents: impl FnOnce(&mut dyn Write) -> Result<(), E>,
-) -> Result<()>
-where
-    E: From<io::Error> + Into<Error>,
-{
+    contents: impl FnOnce(&mut dyn Write) -> Result<()>,
+) -> Result<()> {
     let Some(file) = file else { return Ok(()) };
     file.write(contents)?;
     if json { Ok(()) } else { say!("{title:<12}{}", file.path().display()) }

@@ -6,11 +6,18 @@
 // Results are printed by one function, which handles a closed pipe and a full disk.
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
-pub mod course;
-pub mod destination;
-pub mod numbers;
-pub mod output;
+mod course;
+mod destination;
+mod numbers;
+mod output;
 pub mod program;
-pub mod progress;
+mod progress;
 pub mod row;
 pub mod source;
+
+pub use course::CourseArguments;
+pub use destination::{OutFile, OutFolder, OutName, Replace, write_if_asked};
+pub use numbers::{number_within, whole_within};
+pub use output::{command_line, print, tell_line};
+pub use program::Finding;
+pub use progress::{Show, with_bar};

@@ -11,19 +11,17 @@ use std::env;
 use std::fmt::Arguments;
 use std::io::{self, ErrorKind, Write};
 
-/// Prints a line of a result. Takes the arguments of `println!`, and returns the result of [`print()`](crate::output::print()).
+/// Prints a line of a result. Takes the arguments of `println!`, and returns the result of [`print()`](crate::print()).
 #[macro_export]
 macro_rules! say {
-    ($($words:tt)*) => { $crate::output::print(format_args!("{}\n", format_args!($($words)*))) };
+    ($($words:tt)*) => { $crate::print(format_args!("{}\n", format_args!($($words)*))) };
 }
 
 /// Prints a message. Takes the arguments of `eprintln!`.
 #[macro_export]
 macro_rules! tell {
-    ($($words:tt)*) => { $crate::output::tell_line(format_args!($($words)*)) };
+    ($($words:tt)*) => { $crate::tell_line(format_args!($($words)*)) };
 }
-
-pub use {say, tell};
 
 /// Prints a part of the result, unchanged.
 ///
@@ -43,10 +41,8 @@ pub fn tell_line(line: Arguments) {
     let _ = writeln!(io::stderr(), "{}", in_a_line(&line.to_string()));
 }
 
-/// The command as it was typed, for a report that says how to make it again.
-///
-/// # Errors
-/// If a word cannot be quoted for a shell.
+/// The command as it was typed, for a report that says how to make it again. Fails if a word cannot be quoted for a
+/// shell.
 pub fn command_line() -> Result<String> {
     let words: Vec<String> = ["weeder".to_owned()].into_iter().chain(env::args().skip(1)).collect();
     Ok(shlex::try_join(words.iter().map(String::as_str))?)

@@ -1,7 +1,7 @@
 //! The frame of the programs `weeder` and `weeder-sim`: they parse their words, run a command, and exit with a status.
 
 use crate::numbers::with_negative_numbers;
-use crate::output::tell;
+use crate::tell;
 use anyhow::Result;
 use clap::builder::StyledStr;
 use clap::error::{ContextKind, ContextValue, ErrorKind};

@@ -4,7 +4,7 @@
 
 use indicatif::{ProgressBar, ProgressStyle};
 use std::process;
-use std::sync::{Mutex, MutexGuard, Once, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Steps of a full bar.
 const STEPS: u64 = 1000;
@@ -27,7 +27,13 @@ pub fn with_bar<T>(words: &'static str, work: impl FnOnce(Show) -> T) -> T {
     }
     if !bar.is_hidden() {
         *shown() = Some(bar.clone());
-        clear_when_interrupted();
+        // Catching Ctrl-C fails from the second bar on. If it fails before, Ctrl-C does not remove the bar.
+        let _ = ctrlc::set_handler(|| {
+            if let Some(bar) = shown().take() {
+                bar.finish_and_clear();
+            }
+            process::exit(INTERRUPTED);
+        });
     }
     let done = work(&|share| bar.set_position((share * STEPS as f64) as u64));
     *shown() = None;
@@ -37,18 +43,4 @@ pub fn with_bar<T>(words: &'static str, work: impl FnOnce(Show) -> T) -> T {
 
 fn shown() -> MutexGuard<'static, Option<ProgressBar>> {
     SHOWN.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// Makes Ctrl-C remove the bar before it ends the command.
-fn clear_when_interrupted() {
-    static CAUGHT: Once = Once::new();
-    CAUGHT.call_once(|| {
-        // If Ctrl-C cannot be caught, it ends the command without removing the bar.
-        let _ = ctrlc::set_handler(|| {
-            if let Some(bar) = shown().take() {
-                bar.finish_and_clear();
-            }
-            process::exit(INTERRUPTED);
-        });
-    });
 }

@@ -1,11 +1,8 @@
 //! `weeder sim`: the real firmware on a virtual Uno, on a simulated row or on a recording of a real encoder.
 
-use crate::course::CourseArguments;
-use crate::destination::{OutFile, OutFolder, OutName, Replace, write_if_asked};
-use crate::output::{print, say};
-use crate::program::Finding;
-use crate::progress::with_bar;
-use crate::source;
+use crate::{
+    CourseArguments, Finding, OutFile, OutFolder, OutName, Replace, print, say, source, with_bar, write_if_asked,
+};
 use anyhow::Result;
 use clap::Args;
 use field::motion::mm_s;
@@ -19,7 +16,7 @@ use std::path::PathBuf;
 use uno::elf::Size;
 use uno::{PinChange, recording};
 use uno_run::Outcome;
-use uno_run::replay::{Counted, replay};
+use uno_run::replay::{Counted, Replay, replay};
 use uno_run::{animation, firmware, picture, report};
 
 /// The arguments.
@@ -73,10 +70,7 @@ pub struct Arguments {
 /// The files of a report.
 const REPORT: [&str; 5] = ["row.svg", "weeding.svg", "row.csv", "plants.csv", "weeds.csv"];
 
-/// Runs it and prints the result.
-///
-/// # Errors
-/// If an argument or a file is wrong, or the firmware cannot be run.
+/// Runs it and prints the result. Fails if an argument or a file is wrong, or the firmware cannot be run.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let replace = arguments.replace;
     let folder = arguments.out.as_ref().map(|out| out.folder(REPORT, replace)).transpose()?;
@@ -139,16 +133,17 @@ fn weed(arguments: &Arguments, row: Row, folder: Option<&OutFolder>, vcd: Option
 
 fn write_folder(folder: &OutFolder, pass: &Pass, outcome: &Outcome, speed_mm_s: f64) -> Result<()> {
     let [drawing, moving, row, plants, weeds] = REPORT;
-    folder.write(row, |to| pass.row.write_csv(to))?;
-    folder.write(plants, |to| report::write_csv(&report::plants(outcome), to))?;
-    folder.write(weeds, |to| report::write_csv(&report::weeds(outcome), to))?;
-    folder.write(drawing, |to| svg::write(to, &picture::draw(&pass.row, &outcome.judgement)))?;
+    folder.write(row, |to| Ok(pass.row.write_csv(to)?))?;
+    folder.write(plants, |to| Ok(report::write_csv(&report::plants(outcome), to)?))?;
+    folder.write(weeds, |to| Ok(report::write_csv(&report::weeds(outcome), to)?))?;
+    folder.write(drawing, |to| Ok(svg::write(to, &picture::draw(&pass.row, &outcome.judgement))?))?;
     let animation = animation::draw(&pass.row, &pass.machine, &outcome.judgement, speed_mm_s);
-    folder.write(moving, |to| svg::write(to, &animation))
+    folder.write(moving, |to| Ok(svg::write(to, &animation)?))
 }
 
 fn write_waveform(arguments: &Arguments, vcd: Option<&OutFile>, changes: &[PinChange]) -> Result<()> {
-    write_if_asked(vcd, "Waveform", arguments.json, |to| recording::write(to, &wiring::WIRES, changes.iter().copied()))
+    let changes = changes.iter().copied();
+    write_if_asked(vcd, "Waveform", arguments.json, |to| Ok(recording::write(to, &wiring::WIRES, changes)?))
 }
 
 /// The result for the row, with the names of the CSV tables.
@@ -178,26 +173,17 @@ fn in_json(arguments: &Arguments, pass: &Pass, outcome: &Outcome) -> Value {
 
 fn play(arguments: &Arguments, capture: &[PinChange], vcd: Option<&OutFile>) -> Result<Finding> {
     let elf = arguments.elf.clone().map_or_else(firmware::build, Ok)?;
-    let played = with_bar("playing", |show| replay(capture, &elf, show))?;
-    let Counted { net_ticks, lowest_ticks, highest_ticks, lost_ticks } = played.counted;
-    let printed = match arguments.json {
-        true => say!(
-            "{:#}",
-            json!({
-                "edges": played.edges,
-                "net_ticks": net_ticks,
-                "lowest_ticks": lowest_ticks,
-                "highest_ticks": highest_ticks,
-                "lost_ticks": lost_ticks,
-            })
-        ),
-        false => say!(
-            "Edges       {} in the recording\n\
-             Counted     net {net_ticks}, lowest {lowest_ticks}, highest {highest_ticks}; {lost_ticks} lost",
-            played.edges
-        ),
+    let Replay { counted, edges, changes } = with_bar("playing", |show| replay(capture, &elf, show))?;
+    let Counted { net_ticks, lowest_ticks, highest_ticks, lost_ticks } = counted;
+    let printed = if arguments.json {
+        let mut json = json!(counted);
+        json["edges"] = edges.into();
+        say!("{json:#}")
+    } else {
+        say!("Edges       {edges} in the recording")?;
+        say!("Counted     net {net_ticks}, lowest {lowest_ticks}, highest {highest_ticks}; {lost_ticks} lost")
     };
-    write_waveform(arguments, vcd, &played.changes)?;
+    write_waveform(arguments, vcd, &changes)?;
     printed?;
     Ok(Finding::Good)
 }

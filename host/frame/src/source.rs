@@ -1,17 +1,13 @@
 //! Input files of commands: `-` is standard input. Some words are known names instead of files, and a shell's
 //! completion offers them.
 
-use crate::output::tell;
+use crate::tell;
 use clap::builder::{OsStringValueParser, PossibleValue, TypedValueParser};
 use clap::{Arg, Command};
 use field::conditions::{Conditions, presets};
 use files::FileError;
 use std::ffi::{OsStr, OsString};
 use std::path::PathBuf;
-
-/// Standard input as a file, if the system has one.
-#[cfg(unix)]
-const STANDARD_INPUT: &str = "/dev/stdin";
 
 /// An input file.
 pub fn file() -> impl TypedValueParser<Value = PathBuf> {
@@ -27,18 +23,13 @@ pub fn preset_or_file() -> impl TypedValueParser<Value = String> {
 /// A file's name, or a word with another meaning. Fails only if the system has no file for standard input.
 fn named(name: OsString) -> Result<OsString, String> {
     match name.to_str() {
-        #[cfg(unix)]
-        Some("-") => Ok(STANDARD_INPUT.into()),
-        #[cfg(not(unix))]
+        Some("-") if cfg!(unix) => Ok("/dev/stdin".into()),
         Some("-") => Err("standard input cannot be read here: name a file".to_owned()),
         _ => Ok(name),
     }
 }
 
-/// The conditions of a field. Prints what is likely wrong with them.
-///
-/// # Errors
-/// If it is neither a preset nor a valid file.
+/// The conditions of a field. Prints what is likely wrong with them. Fails if it is neither a preset nor a valid file.
 pub fn field(preset_or_file: &str) -> Result<Conditions, FileError> {
     let conditions = Conditions::load(preset_or_file)?;
     conditions.warning().iter().for_each(|warning| tell!("Warning: {warning}"));

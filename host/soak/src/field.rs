@@ -78,47 +78,49 @@ struct Field<M> {
     tally: Tally,
 }
 
-/// Runs the decisions for this many simulated hours. `progress` gets the share done, from 0 to 1.
+/// What a soak runs.
+#[derive(Clone, Copy, Debug)]
+pub enum Subject<'a> {
+    /// The decisions. A part is an hour.
+    Decisions,
+    /// The firmware at this path. A part is a minute.
+    Firmware(&'a Path),
+}
+
+/// Runs this many parts, the last of them shortened if they are no whole number. `progress` gets the share done, from 0
+/// to 1.
 ///
 /// # Errors
-/// [`SoakError`].
-pub fn hours(plan: Plan, hours: f64, mut progress: impl FnMut(f64)) -> Result<Tally, SoakError> {
-    total((0..hours.ceil() as u64).map(|number| {
+/// If a row does not grow, or a new machine does not start.
+pub fn run(plan: Plan, subject: Subject, parts: f64, mut progress: impl FnMut(f64)) -> Result<Tally, SoakError> {
+    total((0..parts.ceil() as u64).map(|number| {
         let begun = number as f64;
-        let share = (hours - begun).min(1.0);
-        part(plan, ("hour", number), share * 3600.0, Decisions::boot, |done| progress((begun + share * done) / hours))
+        let share = (parts - begun).min(1.0);
+        part(plan, subject, (number, share), |done| progress((begun + share * done) / parts))
     }))
 }
 
-/// Runs the decisions for an hour of a soak, with this number from 0. `progress` gets the share of the hour.
+/// Runs the part with a number from 0, or a share of it. `progress` gets the share of that which is done.
 ///
 /// # Errors
-/// [`SoakError`].
-pub fn hour(plan: Plan, number: u64, progress: impl FnMut(f64)) -> Result<Tally, SoakError> {
-    part(plan, ("hour", number), 3600.0, Decisions::boot, progress)
-}
-
-/// Runs the firmware at `elf` for this many simulated minutes. `progress` gets the share done, from 0 to 1.
-///
-/// # Errors
-/// [`SoakError`].
-pub fn minutes(plan: Plan, minutes: u64, elf: &Path, mut progress: impl FnMut(f64)) -> Result<Tally, SoakError> {
-    total(
-        (0..minutes)
-            .map(|number| minute(plan, number, elf, |share| progress((number as f64 + share) / minutes as f64))),
-    )
-}
-
-/// Runs the firmware at `elf` for a minute of a soak, with this number from 0. `progress` gets the share of the minute.
-///
-/// # Errors
-/// [`SoakError`].
-pub fn minute(plan: Plan, number: u64, elf: &Path, progress: impl FnMut(f64)) -> Result<Tally, SoakError> {
-    part(plan, ("minute", number), 60.0, |beginning, world| Board::boot(elf, beginning, world), progress)
+/// As [`run`].
+pub fn part(
+    plan: Plan,
+    subject: Subject,
+    (number, share): (u64, f64),
+    progress: impl FnMut(f64),
+) -> Result<Tally, SoakError> {
+    match subject {
+        Subject::Decisions => of_machine(plan, ("hour", number), 3600.0 * share, Decisions::boot, progress),
+        Subject::Firmware(elf) => {
+            let boot = |beginning: &Beginning, world: &World| Board::boot(elf, beginning, world);
+            of_machine(plan, ("minute", number), 60.0 * share, boot, progress)
+        }
+    }
 }
 
 /// Runs a machine for a part of a soak, which has a name and a number from 0. `progress` gets the share done.
-fn part<M: Machine>(
+fn of_machine<M: Machine>(
     plan: Plan,
     (name, number): (&str, u64),
     seconds: f64,

@@ -8,11 +8,12 @@ use crate::console::Status;
 use crate::run::{PROGRESS_CYCLES, PassError, boot};
 use field::machine::counts;
 use field::wiring;
+use serde::Serialize;
 use std::path::Path;
 use uno::PinChange;
 
 /// The firmware's count, relative to its position at the start of the recording.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Counted {
     /// Count at the end.
     pub net_ticks: i64,

@@ -1,7 +1,7 @@
 //! Writes with avrdude: passes its messages on, and ends it if its port is gone or it falls silent.
 
 use super::bootloader::Signature;
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use std::collections::HashSet;
 use std::fs;
 use std::io::{self, BufRead, BufReader, Write};
@@ -20,7 +20,6 @@ const GRACE: Duration = Duration::from_secs(2);
 /// Time between two looks at the port.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// How to get avrdude.
 const GET_IT: &str = if cfg!(windows) {
     "put avrdude.exe and avrdude.conf from https://github.com/avrdudes/avrdude/releases beside weeder.exe"
 } else if cfg!(target_os = "macos") {
@@ -29,20 +28,12 @@ const GET_IT: &str = if cfg!(windows) {
     "`sudo apt install avrdude` or ./setup.sh installs it"
 };
 
-/// What came of it.
-pub struct Written {
-    pub succeeded: bool,
-    pub port_is_gone: bool,
-    pub is_silent: bool,
-    /// The chip's signature, if avrdude has printed it.
-    pub signature: Option<Signature>,
-}
+/// Writing cannot reach the bootloader.
+const WHOLE: &str = "The bootloader is not changed";
 
-/// Writes and verifies an Intel HEX file.
-///
-/// # Errors
-/// If avrdude is not installed.
-pub fn write(image: &Path, port: &str, baud: u32) -> Result<Written> {
+/// Writes and verifies an Intel HEX file. Returns whether avrdude succeeded, and the chip's signature, if avrdude has
+/// printed it. Fails if avrdude is not installed, falls silent, or loses the port.
+pub fn write(image: &Path, port: &str, baud: u32) -> Result<(bool, Option<Signature>)> {
     // A link may stay when its port goes. On Windows a port is no file.
     let device: Option<PathBuf> = if cfg!(windows) { None } else { fs::canonicalize(port).ok() };
     let mut avrdude = Command::new("avrdude")
@@ -55,42 +46,36 @@ pub fn write(image: &Path, port: &str, baud: u32) -> Result<Written> {
         .with_context(|| format!("avrdude cannot be started: {GET_IT}, or flash in the page"))?;
     let (heard, alive) = mpsc::channel();
     let words = avrdude.stderr.take();
-    let reader = thread::spawn(move || {
-        let from = words.map(BufReader::new);
-        from.and_then(|from| pass_on(from, io::stderr(), &heard))
-    });
-    let mut ended = Written { succeeded: false, port_is_gone: false, is_silent: false, signature: None };
+    let reader = thread::spawn(move || pass_on(BufReader::new(words?), io::stderr(), &heard));
     let (mut last_word, mut gone_at) = (Instant::now(), None);
-    loop {
+    let succeeded = loop {
         match alive.recv_timeout(LOOK) {
             Ok(()) => last_word = Instant::now(),
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => thread::sleep(LOOK),
         }
         if let Some(status) = avrdude.try_wait().context("avrdude cannot be waited for")? {
-            ended.succeeded = status.success();
-            break;
+            break status.success();
         }
         if gone_at.is_none() && device.as_ref().is_some_and(|device| !device.exists()) {
             gone_at = Some(Instant::now());
         }
-        let is_gone = gone_at.is_some_and(|at| at.elapsed() > GRACE);
-        ended.is_silent = last_word.elapsed() > SILENCE;
-        if is_gone || ended.is_silent {
+        let is_silent = last_word.elapsed() > SILENCE;
+        if is_silent || gone_at.is_some_and(|at| at.elapsed() > GRACE) {
             // It may have ended at this moment.
             let _ = avrdude.kill();
             avrdude.wait().context("avrdude cannot be waited for")?;
-            break;
+            ensure!(
+                gone_at.is_some() || !is_silent,
+                "avrdude fell silent and was ended: plug the Uno out and in, and flash it again. {WHOLE}"
+            );
+            break false;
         }
-    }
+    };
     // Also if it is there again: avrdude had the one that is gone.
     let is_gone = gone_at.is_some() || device.is_some_and(|device| !device.exists());
-    ended.port_is_gone = is_gone && !ended.succeeded;
-    // A process that avrdude has started may hold its output open: what was printed counts only if that has ended.
-    if reader.is_finished() || ended.succeeded || !(ended.is_silent || ended.port_is_gone) {
-        ended.signature = reader.join().ok().flatten();
-    }
-    Ok(ended)
+    ensure!(succeeded || !is_gone, "{port} is gone while the Uno was written: plug it in, and flash it again. {WHOLE}");
+    Ok((succeeded, reader.join().ok().flatten()))
 }
 
 /// How avrdude's messages begin.

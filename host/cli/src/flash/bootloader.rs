@@ -49,10 +49,7 @@ pub enum Heard {
     Nothing,
 }
 
-/// Resets the board at a port, and listens to what answers at `baud`.
-///
-/// # Errors
-/// If the port cannot be opened, or goes away.
+/// Resets the board at a port, and listens to what answers at `baud`. Fails if the port cannot be opened, or goes away.
 pub fn heard(claim: &Claim, port: &str, baud: u32) -> Result<Heard> {
     Ok(asked(&mut link::open_to_flash(claim, port, baud)?)?)
 }

@@ -131,9 +131,14 @@ impl CommandLine {
 mod tests {
     use super::*;
 
+    /// Presses the keys of a text, in which `\t` is Tab, and `\n` Enter.
     fn typed(line: &mut CommandLine, text: &str) {
         for character in text.chars() {
-            line.key(KeyCode::Char(character).into());
+            line.key(match character {
+                '\t' => KeyCode::Tab.into(),
+                '\n' => KeyCode::Enter.into(),
+                character => KeyCode::Char(character).into(),
+            });
         }
     }
 
@@ -153,10 +158,7 @@ mod tests {
     #[test]
     fn up_and_down_recall_entered_lines() {
         let mut line = CommandLine::default();
-        for text in ["status", "get k", "get k"] {
-            typed(&mut line, text);
-            line.key(KeyCode::Enter.into());
-        }
+        typed(&mut line, "status\nget k\nget k\n");
         let mut shown = |code: KeyCode| {
             line.key(code.into());
             line.text.clone()
@@ -168,31 +170,27 @@ mod tests {
     #[test]
     fn tab_completes_the_common_part_and_shows_the_choices() {
         let mut line = CommandLine::default();
-        typed(&mut line, "set lea");
-        line.key(KeyCode::Tab.into());
+        typed(&mut line, "set lea\t");
         assert_eq!(line.text, "set lead_");
         assert_eq!(line.candidates, ["set lead_out_ms", "set lead_in_ms"]);
         typed(&mut line, "o");
         assert!(line.candidates.is_empty());
-        line.key(KeyCode::Tab.into());
+        typed(&mut line, "\t");
         assert_eq!((line.text.as_str(), line.cursor), ("set lead_out_ms ", 16));
-        typed(&mut line, "xyz");
-        line.key(KeyCode::Tab.into());
+        typed(&mut line, "xyz\t");
         assert_eq!(line.text, "set lead_out_ms xyz");
     }
 
     #[test]
     fn a_row_s_name_before_a_command_takes_none_of_its_room_and_keeps_nothing_from_being_completed() {
         let mut line = CommandLine::default();
-        typed(&mut line, "row3: set lead_o");
-        line.key(KeyCode::Tab.into());
+        typed(&mut line, "row3: set lead_o\t");
         assert_eq!(line.text, "row3: set lead_out_ms ");
         typed(&mut line, &"x".repeat(200));
         assert_eq!(line.text.len(), "row3: ".len() + COMMAND_LENGTH);
         line.clear();
         assert_eq!((line.text.as_str(), line.cursor), ("", 0));
-        typed(&mut line, "set servo");
-        line.key(KeyCode::Tab.into());
+        typed(&mut line, "set servo\t");
         assert!(!line.candidates.is_empty());
         line.clear();
         assert!(line.candidates.is_empty());

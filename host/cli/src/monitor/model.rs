@@ -28,6 +28,12 @@ pub enum Connection {
     Down(String),
 }
 
+impl Default for Connection {
+    fn default() -> Self {
+        Self::Down("looking for it".to_owned())
+    }
+}
+
 /// An object that the beam has seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Seen {
@@ -58,7 +64,7 @@ pub enum Answer {
 }
 
 /// The state of a row.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct RowModel {
     /// The operator's name for it.
     pub name: String,
@@ -107,7 +113,8 @@ pub struct Model {
 impl Model {
     /// Rows in unknown state.
     pub fn new(names: Vec<String>) -> Self {
-        Self { rows: names.into_iter().map(RowModel::new).collect(), ..Self::default() }
+        let row = |name| RowModel { name, ..RowModel::default() };
+        Self { rows: names.into_iter().map(row).collect(), ..Self::default() }
     }
 
     /// Goes on to a time: a status that is too old is no longer the present one.
@@ -178,49 +185,42 @@ impl Model {
 
     /// Updates a row by an event.
     pub fn update(&mut self, number: usize, happening: Happening) {
+        use EventLine::{Alarm, Newer, Plot, State, Warning};
         // Plants and swings of several rows are too many lines to read.
-        let said = match &happening {
-            Happening::Connected { version, .. } => Some(format!("-- connected to weeder {version}")),
-            Happening::Lost(why) => Some(format!("-- {why}")),
-            Happening::Started { while_at_work: Some(cause), .. } => Some(format!("-- {}", advice::restarted(cause))),
-            Happening::Event(EventLine::Plot, _) => None,
-            Happening::Event(
-                EventLine::Alarm { .. } | EventLine::Warning { .. } | EventLine::State { .. } | EventLine::Newer { .. },
-                line,
-            ) => Some(line.clone()),
-            Happening::Event(_, line) => (!self.are_several()).then(|| line.clone()),
-            Happening::Command(line) => (!self.are_several()).then(|| format!("> {line}")),
-            Happening::Answer(line) => Some(line.clone()),
-            _ => None,
-        };
-        if let Happening::Answer(line) = &happening
-            && let Some(head) = self.rows[number].heading.before(line)
-        {
-            self.say_of(number, &format!("-- {head}"));
-        }
-        if let Some(said) = said {
-            self.say_of(number, &said);
-        }
-        if let Happening::Connected { version, shown, .. } = &happening
-            && let Some(other) = settings::other_version(version, shown)
-        {
-            self.say_of(number, &format!("-- {other}"));
-        }
+        let is_alone = !self.are_several();
         let row = &mut self.rows[number];
+        let mut said = Vec::new();
+        match &happening {
+            Happening::Connected { version, shown, .. } => {
+                said.push(format!("-- connected to weeder {version}"));
+                said.extend(settings::other_version(version, shown).map(|other| format!("-- {other}")));
+            }
+            Happening::Lost(why) => said.push(format!("-- {why}")),
+            Happening::Started { while_at_work: Some(cause), .. } => {
+                said.push(format!("-- {}", advice::restarted(cause)));
+            }
+            Happening::Event(Plot, _) => {}
+            Happening::Event(Alarm { .. } | Warning { .. } | State { .. } | Newer { .. }, line) => {
+                said.push(line.clone());
+            }
+            Happening::Event(_, line) if is_alone => said.push(line.clone()),
+            Happening::Command(line) if is_alone => said.push(format!("> {line}")),
+            Happening::Answer(line) => {
+                said.extend(row.heading.before(line).map(|head| format!("-- {head}")));
+                said.push(line.clone());
+            }
+            _ => {}
+        }
         self.rings |= match &happening {
-            Happening::Event(EventLine::Alarm { .. } | EventLine::Newer { is_alarm: true }, _)
+            Happening::Event(Alarm { .. } | Newer { is_alarm: true }, _)
             | Happening::Started { while_at_work: Some(_), .. } => true,
             Happening::Lost(_) => row.is_there(),
             _ => false,
         };
         row.update(happening);
-        let (step, warning) = (row.take_step(), row.take_warning());
-        if let Some(step) = step {
-            self.say_of(number, &format!("-- next, {step}"));
-        }
-        if let Some(warning) = warning {
-            self.say_of(number, &format!("-- warning: {warning}"));
-        }
+        said.extend(row.take_step().map(|step| format!("-- next, {step}")));
+        said.extend(row.take_warning().map(|warning| format!("-- warning: {warning}")));
+        said.iter().for_each(|line| self.say_of(number, line));
     }
 
     /// Adds a line to the console.
@@ -242,27 +242,6 @@ impl Model {
 }
 
 impl RowModel {
-    /// A row in unknown state.
-    fn new(name: String) -> Self {
-        Self {
-            name,
-            connection: Connection::Down("looking for it".to_owned()),
-            status: None,
-            is_known: false,
-            status_at: None,
-            restarted: None,
-            settings: Settings::new(),
-            objects: VecDeque::new(),
-            zones: VecDeque::new(),
-            advice: None,
-            answer: Answer::None,
-            set_up: SetUp::default(),
-            step: None,
-            heading: Heading::default(),
-            warning: None,
-        }
-    }
-
     /// The warning about the margin, if it has changed.
     fn take_warning(&mut self) -> Option<String> {
         let warning = self.set_up.warning(&self.settings);
@@ -286,11 +265,6 @@ impl RowModel {
     /// The present status; `None` if it is unknown.
     pub fn present(&self) -> Option<&Status> {
         self.status.as_ref().filter(|_| self.is_known)
-    }
-
-    /// The last known mode.
-    fn mode(&self) -> Option<Mode> {
-        self.status.as_ref().map(|status| status.mode)
     }
 
     /// What the operator must notice: a restart at work, and the advice for an alarm or a warning.
@@ -345,7 +319,7 @@ impl RowModel {
     fn take_status(&mut self, status: Status) {
         if let Some(alarm) = status.alarm {
             self.advice = Some(format!("alarm {}: {}", advice::name(alarm), advice::alarm(alarm)));
-        } else if self.mode() == Some(Mode::Alarm) {
+        } else if self.status.as_ref().is_some_and(|last| last.mode == Mode::Alarm) {
             self.advice = None;
         }
         if status.mode == Mode::Work {

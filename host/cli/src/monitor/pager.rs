@@ -44,23 +44,17 @@ impl Pager {
     /// The rows of a screen of this size.
     pub fn rows<'a>(&self, lines: &[&'a str], width: u16, height: u16) -> Vec<&'a str> {
         let (width, height) = (usize::from(width), usize::from(height));
+        let numbered = lines.iter().enumerate();
+        let rows = numbered.flat_map(|(line, text)| wrapped(text, width).into_iter().map(move |row| (line, row)));
+        let rows: Vec<(usize, &str)> = rows.collect();
         let end = self.end.unwrap_or(lines.len()).min(lines.len());
-        let mut rows: Vec<&str> = Vec::new();
-        let mut first = end;
-        while first > 0 && rows.len() < height {
-            first -= 1;
-            rows.splice(0..0, wrapped(lines[first], width));
-        }
-        rows.drain(..rows.len().saturating_sub(height));
         // The first page is full too.
-        let mut next = end;
-        while next < lines.len() && rows.len() < height {
-            rows.extend(wrapped(lines[next], width));
-            next += 1;
-        }
-        rows.truncate(height);
+        let from = rows.partition_point(|&(line, _)| line < end).saturating_sub(height);
+        let shown: Vec<_> = rows.into_iter().skip(from).take(height).collect();
+        let first = shown.first().map_or(end, |&(line, _)| line);
+        let next = shown.last().map_or(end, |&(line, _)| line + 1);
         self.shown.set((next - first, next));
-        rows
+        shown.into_iter().map(|(_, row)| row).collect()
     }
 }
 

@@ -9,11 +9,10 @@
 
 use super::addressed;
 use crate::input::{self, Line};
-use crate::output::tell;
 use crate::ports::Chosen;
-use crate::program::Finding;
 use crate::record::Logs;
 use anyhow::{Result, ensure};
+use frame::{Finding, tell};
 use link::advice;
 use link::examples::Heading;
 use link::rows::{Heard, Hold, Rows, What};
@@ -21,8 +20,7 @@ use link::session::Happening;
 use link::settings::other_version;
 use std::collections::VecDeque;
 use std::io::{self, ErrorKind, Write};
-use std::sync::mpsc::{self, Receiver, TryRecvError};
-use std::thread;
+use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::{Duration, Instant};
 
 /// Lines that are read ahead. The others wait in the pipe.
@@ -35,15 +33,10 @@ const LOOK: Duration = Duration::from_millis(20);
 const STALLED: Duration = Duration::from_millis(500);
 
 /// Goes on until the input has ended and its last command has been answered; bad where one was refused. `are_there`
-/// says which rows were there when they were opened.
-///
-/// # Errors
-/// If a line was not sent, an Uno goes away with commands unanswered, or output or log fail.
+/// says which rows were there when they were opened. Fails if a line was not sent, an Uno goes away with commands
+/// unanswered, or output or log fail.
 pub fn run(rows: &Rows, are_there: &[bool], chosen: &Chosen, logs: Option<Logs>) -> Result<Finding> {
-    let (sender, commands) = mpsc::sync_channel(0);
-    // Reading blocks until the operator types, so it has its own thread. The thread ends with the process.
-    thread::spawn(move || input::read(io::stdin().lock(), |line| sender.send(line).is_ok()));
-    match Talk::new(rows, are_there, chosen, logs).run(&commands, &mut io::stdout().lock()) {
+    match Talk::new(rows, are_there, chosen, logs).run(&input::typed(), &mut io::stdout().lock()) {
         // The reader has closed the pipe: it has read enough.
         Err(error) if error.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == ErrorKind::BrokenPipe) => {
             Ok(Finding::Good)
@@ -199,7 +192,7 @@ impl<'a> Talk<'a> {
         let row = heard.row;
         let standing = &mut self.standing[row];
         if let (Some(logs), What::Happened(happening)) = (&mut self.logs, &heard.what) {
-            logs.write(row, happening)?;
+            logs.write(row, |log| log.write(log.now_ms(), happening))?;
         }
         let mut print = |line: &str| writeln!(output, "{}", self.chosen.under_name(row, line));
         match &heard.what {
@@ -270,6 +263,7 @@ mod tests {
     use link::row_names::{Board, Row};
     use link::{LinkError, Wire};
     use rig::ScriptedBoard;
+    use std::sync::mpsc;
 
     #[test]
     fn a_hold_goes_before_an_answer_that_does_not_come() {

@@ -13,10 +13,7 @@ use std::time::{Duration, Instant};
 /// Time between two reads of the keyboard. After each, the screen is drawn again.
 const TURN: Duration = Duration::from_millis(20);
 
-/// Watches until Ctrl-C or Ctrl-D.
-///
-/// # Errors
-/// If the terminal or a log fails.
+/// Watches until Ctrl-C or Ctrl-D. Fails if the terminal or a log fails.
 pub fn run(rows: &Rows, names: Vec<String>, mut logs: Option<Logs>) -> Result<()> {
     let mut terminal = ratatui::try_init().context("the terminal cannot be drawn on: --plain does without")?;
     let result = watch(&mut terminal, rows, Model::new(names), &mut logs);
@@ -29,7 +26,7 @@ fn watch(terminal: &mut DefaultTerminal, rows: &Rows, mut model: Model, logs: &m
         let until = Instant::now() + TURN;
         while let Some(heard) = rows.next(until.saturating_duration_since(Instant::now())) {
             if let (Some(logs), What::Happened(happening)) = (&mut *logs, &heard.what)
-                && let Err(error) = logs.write(heard.row, happening)
+                && let Err(error) = logs.write(heard.row, |log| log.write(log.now_ms(), happening))
             {
                 // The machine is still watched, and the other rows' logs are still written.
                 model.say(format!("-- {:#}", anyhow::Error::from(error)));
@@ -118,9 +115,11 @@ mod tests {
         (rows, Model::new(names.map(str::to_owned).into()))
     }
 
+    /// Presses the keys of a text, in which `\n` is Enter.
     fn typed(model: &mut Model, rows: &Rows, text: &str) {
         for character in text.chars() {
-            take_key(model, rows, KeyCode::Char(character).into());
+            let code = if character == '\n' { KeyCode::Enter } else { KeyCode::Char(character) };
+            take_key(model, rows, code.into());
         }
     }
 
@@ -131,19 +130,12 @@ mod tests {
         typed(&mut model, &rows, "set k");
         assert!(model.hold.is_none());
         take_key(&mut model, &rows, KeyCode::Esc.into());
-        assert_eq!(
-            model.hold.as_ref().map(|hold| hold.summary(&model.names())).as_deref(),
-            Some("HOLD 0 of 2; NOT THERE: left, right")
-        );
-        assert_eq!(
-            (model.line.text.as_str(), model.target),
-            ("", Some(0)),
-            "it does not stand before the next command"
-        );
+        let summary = model.hold.as_ref().map(|hold| hold.summary(&model.names()));
+        assert_eq!(summary.as_deref(), Some("HOLD 0 of 2; NOT THERE: left, right"));
+        assert_eq!((&*model.line.text, model.target), ("", Some(0)), "it does not stand before the next command");
         // The word `hold`, typed to all rows, does the same.
         (model.hold, model.target) = (None, None);
-        typed(&mut model, &rows, "hold");
-        take_key(&mut model, &rows, KeyCode::Enter.into());
+        typed(&mut model, &rows, "hold\n");
         assert!(model.hold.is_some());
     }
 
@@ -159,14 +151,9 @@ mod tests {
             String::from_utf8(written).expect("a bell is ASCII")
         };
         let event = |line: &str| Happening::Event(EventLine::parse(line).expect("it is one"), line.to_owned());
-        let connected = || Happening::Connected {
-            version: "1".to_owned(),
-            settings: Settings::new(),
-            shown: Vec::new(),
-            examples: Vec::new(),
-        };
+        let (version, settings, shown, examples) = ("1".to_owned(), Settings::new(), Vec::new(), Vec::new());
         assert_eq!(rung(Happening::Lost("it is not there".to_owned())), "", "it never was there");
-        assert_eq!(rung(connected()), "");
+        assert_eq!(rung(Happening::Connected { version, settings, shown, examples }), "");
         assert_eq!(rung(event("state is=work")), "");
         assert_eq!(rung(event("alarm code=2-1 name=encoder_silent pos=1")), "\x07");
         assert_eq!(rung(event("warning name=no_plants")), "");
@@ -177,10 +164,9 @@ mod tests {
     fn a_row_s_name_before_a_colon_has_the_command_go_to_that_row_alone() {
         let (rows, mut model) = absent(["row1", "row2", "row3"]);
         let mut enter = |text: &str| {
-            typed(&mut model, &rows, text);
-            take_key(&mut model, &rows, KeyCode::Enter.into());
-            let waiting: Vec<&str> =
-                model.rows.iter().filter(|row| row.answer == Answer::Waiting).map(|row| row.name.as_str()).collect();
+            typed(&mut model, &rows, &format!("{text}\n"));
+            let waiting = model.rows.iter().filter(|row| row.answer == Answer::Waiting);
+            let waiting: Vec<&str> = waiting.map(|row| row.name.as_str()).collect();
             let last = model.lines.back().cloned().unwrap_or_default();
             let said = (waiting.join(" "), last, model.hold.is_some());
             model.rows.iter_mut().for_each(|row| row.answer = Answer::None);

@@ -35,7 +35,6 @@ fn draw_top(left: Line, frame: &mut Frame, area: Rect) {
     frame.render_widget(Line::raw(HOLD_KEY).style(HOLD_STYLE), key);
 }
 
-/// The style of the key for HOLD.
 const HOLD_STYLE: Style = bold(Color::White).bg(Color::Red);
 
 /// The style of an alarm, or of a machine that is not there.
@@ -45,8 +44,7 @@ const fn bold(colour: Color) -> Style {
     Style::new().fg(colour).add_modifier(Modifier::BOLD)
 }
 
-/// The colour of a state.
-fn colour(mode: Mode) -> Color {
+const fn colour(mode: Mode) -> Color {
     match mode {
         Mode::Hold => Color::Yellow,
         Mode::Work => Color::Green,
@@ -69,11 +67,6 @@ fn column_of(row: &RowModel, columns: usize, ahead_of_tool_mm: f64) -> f64 {
     let beam_to_tool = f64::from(row.settings.get(Setting::BeamToToolMm));
     let mm_per_column = 1.25 * beam_to_tool / columns.max(1) as f64;
     (ahead_of_tool_mm + 0.25 * beam_to_tool) / mm_per_column
-}
-
-/// The tool's column.
-fn tool_column(row: &RowModel, columns: usize) -> usize {
-    column_of(row, columns, 0.0).round() as usize
 }
 
 /// The ground from a little behind the tool to the beam. The machine rolls to the right.
@@ -101,16 +94,13 @@ fn ground(row: &RowModel, columns: usize) -> String {
             paint(from, to, Ground::Canopy);
         }
     }
-    ground.iter().map(symbol).collect()
-}
-
-fn symbol(ground: &Ground) -> char {
-    match ground {
+    let symbol = |ground| match ground {
         Ground::Bare => '_',
         Ground::Weed => '\'',
         Ground::Margin => '░',
         Ground::Canopy => '█',
-    }
+    };
+    ground.into_iter().map(symbol).collect()
 }
 
 /// The part of the console's output that is shown, as many lines as there is room for.

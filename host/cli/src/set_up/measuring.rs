@@ -1,8 +1,8 @@
 //! The measurements of a set-up: the servo's times, the wheel, and the margin that follows from them.
 
 use super::{End, Guide};
-use crate::output::{say, tell};
 use anyhow::{Error, Result, bail};
+use frame::{say, tell};
 use link::settings::{self, Setting, name};
 use link::{ConsoleLine, EventLine, Status};
 use set_up::{SetUp, Step};
@@ -27,13 +27,12 @@ impl Guide {
         self.push(&[])?;
         let has_switch = settings::read(&mut self.link)?.get(Setting::EndSwitch) > 0;
         let shown = if has_switch { "on" } else { "off" };
-        let wanted = loop {
-            match self.ask_for("An end switch on D5 times the servo by itself: on, off", Some(shown))?.as_str() {
-                "on" => break 1,
-                "off" => break 0,
-                _ => tell!("  error: type on or off"),
-            }
-        };
+        let question = "An end switch on D5 times the servo by itself: on, off";
+        let wanted = self.ask_for(question, Some(shown), |typed| match typed {
+            "on" => Ok(1),
+            "off" => Ok(0),
+            _ => Err("type on or off".to_owned()),
+        })?;
         self.push(&[(Setting::EndSwitch, wanted)])?;
         loop {
             let settings = settings::read(&mut self.link)?;
@@ -142,7 +141,7 @@ impl Guide {
                 continue;
             }
             let question = "Roll to the other mark and stand still; the distance in mm";
-            let length = self.ask_for(question, Some(&length_mm.to_string()))?;
+            let length = self.ask_for(question, Some(&length_mm.to_string()), |typed| Ok(typed.to_owned()))?;
             self.stands_at(Some(from))?;
             let command = format!("calibrate {length}");
             let Some(answer) = self.ask(&command)? else { continue };
@@ -191,7 +190,7 @@ impl Guide {
     fn pass_plant(&mut self) -> Result<()> {
         let deadline = Instant::now() + PLANTS;
         while Instant::now() < deadline {
-            match self.typed.try_recv().as_deref() {
+            match self.typed.try_recv().as_ref().map(|typed| typed.text.trim()) {
                 Ok("s") => return Err(Error::msg(End::LeaveOut)),
                 Ok("q") | Err(TryRecvError::Disconnected) => return Err(Error::msg(End::Stop)),
                 _ => {}

@@ -63,11 +63,8 @@ fn weeded(conditions: &Conditions) -> Result<Vec<Total>> {
     Ok(totals(&experiment.run(&Engine::Native, |_| ())?))
 }
 
-/// What a machine with these settings and a tool of this width is expected to weed. The servo, wheel and ground are those
-/// of the field.
-///
-/// # Errors
-/// If the simulated machine cannot have these settings.
+/// What a machine with these settings and a tool of this width is expected to weed. The servo, wheel and ground are
+/// those of the field. Fails if the simulated machine cannot have these settings.
 pub fn expected(settings: &Settings, tool_width_mm: f64) -> Result<String> {
     let mut conditions = Conditions::load(conditions::DEFAULT)?.from_the_box();
     // A calibrated wheel: 2010 ticks a metre with this field's slip.

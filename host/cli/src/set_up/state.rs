@@ -1,7 +1,7 @@
 //! The file of a set-up: its board, completed steps, measurements, and the board's settings as they were last.
 
-use crate::output::tell;
 use anyhow::{Result, bail};
+use frame::tell;
 use link::row_names::Board;
 use link::settings::{Setting, name};
 use set_up::SetUp;
@@ -63,10 +63,7 @@ impl State {
         lines.join("\n")
     }
 
-    /// Takes the board that is there.
-    ///
-    /// # Errors
-    /// If the file belongs to a board with another serial number.
+    /// Takes the board that is there. Fails if the file belongs to a board with another serial number.
     pub(super) fn take_board(&mut self, board: &Board, path: &Path) -> Result<()> {
         let named = match board {
             Board::SerialNumber(number) => format!("{NUMBER}{number}"),

@@ -2,12 +2,13 @@
 //! screen shows only the state and the ground, in a few lines.
 
 use super::{
-    HOLD_KEY, HOLD_STYLE, URGENT, bold, colour, draw_line, draw_said, draw_top, ground, shown_lines, tool_column,
+    HOLD_KEY, HOLD_STYLE, URGENT, bold, colour, column_of, draw_line, draw_said, draw_top, ground, shown_lines,
 };
 use crate::monitor::model::{Connection, Model, RowModel, Seen};
 use link::names;
 use ratatui::Frame;
-use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::layout::Constraint::{Length, Min};
+use ratatui::layout::{Layout, Rect};
 use ratatui::style::Stylize;
 use ratatui::text::{Line, Span, Text};
 use ratatui::widgets::{Block, Paragraph, Row, Table, Wrap};
@@ -28,24 +29,14 @@ pub fn draw(model: &Model, row: &RowModel, frame: &mut Frame) {
 
 /// The state, with the tool and the reason for its being out. If it is unknown, the last known state.
 fn state(row: &RowModel) -> Line<'static> {
-    let Some(status) = row.present() else { return Line::raw(unknown(row)).dim() };
-    let reason = status.reason.as_deref().map_or_else(String::new, |reason| format!(" for {reason}"));
-    Line::from(vec![
-        Span::raw("state "),
-        Span::styled(format!("{:<8}", status.mode.name()), bold(colour(status.mode))),
-        Span::raw(format!("tool {}{reason}", if status.tool_out { "out" } else { "in" })),
-    ])
-}
-
-/// The state of a machine whose present state is unknown.
-fn unknown(row: &RowModel) -> String {
-    match &row.status {
-        None => "state unknown, tool unknown".to_owned(),
-        Some(status) => {
-            let tool = if status.tool_out { "out" } else { "in" };
-            format!("state unknown, last heard: {}, tool {tool}", status.mode.name())
-        }
+    let Some(status) = &row.status else { return "state unknown, tool unknown".dim().into() };
+    let (mode, tool) = (status.mode.name(), if status.tool_out { "out" } else { "in" });
+    if row.present().is_none() {
+        return format!("state unknown, last heard: {mode}, tool {tool}").dim().into();
     }
+    let reason = status.reason.as_deref().map_or_else(String::new, |reason| format!(" for {reason}"));
+    let mode = Span::styled(format!("{mode:<8}"), bold(colour(status.mode)));
+    Line::from(vec![Span::raw("state "), mode, Span::raw(format!("tool {tool}{reason}"))])
 }
 
 fn speed_and_place(row: &RowModel) -> String {
@@ -71,12 +62,12 @@ fn draw_small(model: &Model, row: &RowModel, frame: &mut Frame) {
     let mut take = |wanted: usize| {
         let got = left.min(wanted as u16);
         left -= got;
-        Constraint::Length(got)
+        Length(got)
     };
     let (top, advice, line, hint) = (take(1), take(wrapped.min(4)), take(1), take(1));
     let (ground, speed) = (take(2), take(1));
     let [top, advice, ground, speed, said, line, hint] =
-        Layout::vertical([top, advice, ground, speed, Constraint::Length(left), line, hint]).areas(area);
+        Layout::vertical([top, advice, ground, speed, Length(left), line, hint]).areas(area);
     let state = if row.is_there() { state(row) } else { Line::styled("NO WEEDER", URGENT) };
     draw_top(state, frame, top);
     frame.render_widget(Paragraph::new(urgent.unwrap_or_default()).style(URGENT).wrap(Wrap { trim: true }), advice);
@@ -89,16 +80,9 @@ fn draw_small(model: &Model, row: &RowModel, frame: &mut Frame) {
 }
 
 fn draw_all(model: &Model, row: &RowModel, frame: &mut Frame) {
-    let [machine, ground, advice, middle, line, hint] = Layout::vertical([
-        Constraint::Length(4),
-        Constraint::Length(5),
-        Constraint::Length(1),
-        Constraint::Min(4),
-        Constraint::Length(1),
-        Constraint::Length(1),
-    ])
-    .areas(frame.area());
-    let [objects, said] = Layout::horizontal([Constraint::Length(40), Constraint::Min(10)]).areas(middle);
+    let [machine, ground, advice, middle, line, hint] =
+        Layout::vertical([Length(4), Length(5), Length(1), Min(4), Length(1), Length(1)]).areas(frame.area());
+    let [objects, said] = Layout::horizontal([Length(40), Min(10)]).areas(middle);
     draw_machine(row, frame, machine);
     draw_ground(row, frame, ground);
     if let Some(text) = row.advice() {
@@ -129,7 +113,7 @@ fn draw_machine(row: &RowModel, frame: &mut Frame, area: Rect) {
 
 /// The marks of tool and beam.
 fn marks(row: &RowModel, columns: usize) -> String {
-    let tool_at = tool_column(row, columns);
+    let tool_at = column_of(row, columns, 0.0).round() as usize;
     let tool = match row.present().map(|status| status.tool_out) {
         None => "? tool",
         Some(true) => "△ tool out",
@@ -169,7 +153,7 @@ fn draw_objects(machine: &RowModel, frame: &mut Frame, area: Rect) {
             format!("{:.0} mm", machine.millimetres(seen.spacing)),
         ])
     };
-    let widths = [Constraint::Length(8), Constraint::Length(5), Constraint::Length(9), Constraint::Length(9)];
+    let widths = [Length(8), Length(5), Length(9), Length(9)];
     let table = Table::new(machine.objects.iter().map(row), widths)
         .header(Row::new(["class", "votes", "width", "spacing"]).dim())
         .block(Block::bordered().title(" detections, the newest first "));

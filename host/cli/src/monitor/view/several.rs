@@ -6,7 +6,8 @@ use super::{URGENT, bold, colour, draw_line, draw_said, draw_top, ground, shown_
 use crate::monitor::model::{Answer, Connection, Model, RowModel};
 use link::{Mode, advice};
 use ratatui::Frame;
-use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::layout::Constraint::{Length, Min};
+use ratatui::layout::{Layout, Rect};
 use ratatui::style::{Style, Stylize};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
@@ -26,16 +27,11 @@ pub fn draw(model: &Model, rows: &[RowModel], frame: &mut Frame) {
     // the advice.
     let others = if is_roomy { 3 + 3 + 1 } else { 3 };
     let room = usize::from(area.height.saturating_sub(others)).min(rows.len());
-    let [top, list, advice, said, line, hint] = Layout::vertical([
-        Constraint::Length(1),
-        Constraint::Length(room as u16),
-        Constraint::Length(u16::from(is_roomy)),
-        Constraint::Min(0),
-        Constraint::Length(1),
-        Constraint::Length(1),
-    ])
-    .areas(area);
-    draw_top(counted(rows), frame, top);
+    let [top, list, advice, said, line, hint] =
+        Layout::vertical([Length(1), Length(room as u16), Length(u16::from(is_roomy)), Min(0), Length(1), Length(1)])
+            .areas(area);
+    let counted = [vec![Span::raw(format!("{} rows: ", rows.len()))], counts(rows.iter())].concat();
+    draw_top(counted.into(), frame, top);
     draw_list(model, rows, frame, list);
     if let Some((row, text)) = rows.iter().find_map(|row| Some((row, row.advice()?))) {
         frame.render_widget(Line::styled(format!("{}: {text}", row.name), URGENT), advice);
@@ -49,58 +45,32 @@ pub fn draw(model: &Model, rows: &[RowModel], frame: &mut Frame) {
     draw_line(model, to, frame, line, hint);
 }
 
-/// The state of a row.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum State {
-    Lost,
-    /// It is there, and does not tell its state.
-    Unknown,
-    Known(Mode),
-}
+/// The state of a row: its name and its style.
+type State = (&'static str, Style);
 
-/// All states, the worst first.
-const STATES: [State; 5] =
-    [State::Lost, State::Unknown, State::Known(Mode::Alarm), State::Known(Mode::Work), State::Known(Mode::Hold)];
+const LOST: State = ("LOST", URGENT);
+/// It is there, and does not tell its state.
+const UNKNOWN: State = ("?", URGENT);
+const ALARM: State = ("ALARM", URGENT);
+const WORK: State = ("work", bold(colour(Mode::Work)));
+const HOLD: State = ("hold", bold(colour(Mode::Hold)));
 
 fn state(row: &RowModel) -> State {
-    match row.present() {
-        _ if !row.is_there() => State::Lost,
-        None => State::Unknown,
-        Some(status) => State::Known(status.mode),
-    }
-}
-
-fn is_urgent(state: State) -> bool {
-    matches!(state, State::Lost | State::Unknown | State::Known(Mode::Alarm))
-}
-
-fn name(state: State) -> &'static str {
-    match state {
-        State::Lost => "LOST",
-        State::Unknown => "?",
-        State::Known(Mode::Alarm) => "ALARM",
-        State::Known(Mode::Work) => "work",
-        State::Known(Mode::Hold) => "hold",
-    }
-}
-
-fn style(state: State) -> Style {
-    match state {
-        State::Known(mode) => bold(colour(mode)),
-        State::Lost | State::Unknown => URGENT,
+    match row.present().map(|status| status.mode) {
+        _ if !row.is_there() => LOST,
+        None => UNKNOWN,
+        Some(Mode::Alarm) => ALARM,
+        Some(Mode::Work) => WORK,
+        Some(Mode::Hold) => HOLD,
     }
 }
 
 /// How many rows are in each state, the worst first.
 fn counts<'a>(rows: impl Iterator<Item = &'a RowModel> + Clone) -> Vec<Span<'static>> {
     let count = |of| rows.clone().filter(|row| state(row) == of).count();
-    let counts = STATES.map(|state| (state, count(state)));
+    let counts = [LOST, UNKNOWN, ALARM, WORK, HOLD].map(|state| (state, count(state)));
     let counts = counts.into_iter().filter(|&(_, count)| count > 0);
-    counts.map(|(state, count)| Span::styled(format!("{count} {} ", name(state)), style(state))).collect()
-}
-
-fn counted(rows: &[RowModel]) -> Line<'static> {
-    Line::from([vec![Span::raw(format!("{} rows: ", rows.len()))], counts(rows.iter())].concat())
+    counts.map(|((name, style), count)| Span::styled(format!("{count} {name} "), style)).collect()
 }
 
 fn draw_list(model: &Model, rows: &[RowModel], frame: &mut Frame, area: Rect) {
@@ -108,7 +78,7 @@ fn draw_list(model: &Model, rows: &[RowModel], frame: &mut Frame, area: Rect) {
     let mut order: Vec<usize> = (0..rows.len()).collect();
     if room < rows.len() {
         // If all rows fit, they keep their order, so that each is easy to find.
-        order.sort_by_key(|&row| (!is_urgent(state(&rows[row])), model.target != Some(row)));
+        order.sort_by_key(|&row| (state(&rows[row]).1 != URGENT, model.target != Some(row)));
     }
     let shown = if room < rows.len() { room.saturating_sub(1) } else { room };
     let longest = rows.iter().map(|row| row.name.chars().count()).max().unwrap_or_default();
@@ -125,7 +95,7 @@ fn draw_list(model: &Model, rows: &[RowModel], frame: &mut Frame, area: Rect) {
 
 /// A row's line.
 fn line(row: &RowModel, name: usize, columns: u16, is_target: bool) -> Line<'static> {
-    let mode = state(row);
+    let (state, style) = state(row);
     let mark = match row.answer {
         Answer::None => ' ',
         Answer::Waiting => '?',
@@ -135,10 +105,10 @@ fn line(row: &RowModel, name: usize, columns: u16, is_target: bool) -> Line<'sta
     let shown: String = row.name.chars().take(name).collect();
     let shown = Span::raw(format!("{shown:<name$} "));
     let shown = if is_target { shown.reversed() } else { shown };
-    let state = Span::styled(format!("{:<5} ", self::name(mode)), style(mode));
+    let state = Span::styled(format!("{state:<5} "), style);
     let room = usize::from(columns).saturating_sub(name + 13);
     let (tool, rest) = match (&row.connection, row.present()) {
-        (Connection::Down(why), _) => ("   ", Span::styled(why.clone(), style(mode))),
+        (Connection::Down(why), _) => ("   ", Span::styled(why.clone(), style)),
         (Connection::Up(_), None) => ("?  ", Span::styled(row.advice().unwrap_or_default(), URGENT)),
         (Connection::Up(_), Some(status)) => {
             let tool = if status.tool_out { "out" } else { "in " };

@@ -30,23 +30,27 @@ fn machine(lines: &[&str]) -> Model {
     model
 }
 
+/// A machine that has rolled along [`ROW`], after these lines.
+fn machine_in_row(lines: &[&str]) -> Model {
+    machine(&[&ROW[..], lines].concat())
+}
+
+/// The row's Uno is lost.
+fn lose(model: &mut Model, row: usize) {
+    model.update(row, Happening::Lost("the port is gone: plug the Uno in again".to_owned()));
+}
+
 /// Connects a row and sends these lines.
 fn tell(model: &mut Model, row: usize, lines: &[&str]) {
-    let version = "0.2.0".to_owned();
-    model.update(
-        row,
-        Happening::Connected { version, settings: Settings::new(), shown: Vec::new(), examples: Vec::new() },
-    );
-    for line in lines {
-        let line = (*line).to_owned();
-        model.update(
-            row,
-            match ConsoleLine::parse(&line) {
-                ConsoleLine::Status(status) => Happening::Status(status, line),
-                ConsoleLine::Event(event) => Happening::Event(event, line),
-                _ => Happening::Answer(line),
-            },
-        );
+    let (version, settings, shown, examples) = ("0.2.0".to_owned(), Settings::new(), Vec::new(), Vec::new());
+    model.update(row, Happening::Connected { version, settings, shown, examples });
+    for &line in lines {
+        let happening = match ConsoleLine::parse(line) {
+            ConsoleLine::Status(status) => Happening::Status(status, line.to_owned()),
+            ConsoleLine::Event(event) => Happening::Event(event, line.to_owned()),
+            _ => Happening::Answer(line.to_owned()),
+        };
+        model.update(row, happening);
     }
 }
 
@@ -66,11 +70,9 @@ const ROW: [&str; 5] = [
 
 #[test]
 fn zones_move_toward_the_tool() {
-    let mut lines = ROW.to_vec();
-    lines.push("state=work tool=in pos=2196 speed_mm_s=556 windows=1 unseen_mm=0");
-    insta::assert_snapshot!(screen(&machine(&lines)));
-    lines.push("state=work tool=out for=plant pos=2560 speed_mm_s=556 windows=1 unseen_mm=0");
-    insta::assert_snapshot!(screen(&machine(&lines)));
+    insta::assert_snapshot!(screen(&machine_in_row(&[AT_WORK])));
+    let later = "state=work tool=out for=plant pos=2560 speed_mm_s=556 windows=1 unseen_mm=0";
+    insta::assert_snapshot!(screen(&machine_in_row(&[AT_WORK, later])));
 }
 
 #[test]
@@ -104,13 +106,14 @@ fn a_margin_that_nothing_was_measured_for_is_warned_of_once() {
 
 #[test]
 fn an_alarm_is_shown_with_advice_until_it_is_cleared() {
-    let mut lines = ROW.to_vec();
-    lines.push("alarm code=1-1 name=beam_blocked pos=2700");
-    lines.push("state is=alarm");
-    lines.push("state=alarm code=1-1 name=beam_blocked tool=out pos=2700 speed_mm_s=0 windows=0 unseen_mm=400");
-    insta::assert_snapshot!(screen(&machine(&lines)));
+    let mut lines = vec![
+        "alarm code=1-1 name=beam_blocked pos=2700",
+        "state is=alarm",
+        "state=alarm code=1-1 name=beam_blocked tool=out pos=2700 speed_mm_s=0 windows=0 unseen_mm=400",
+    ];
+    insta::assert_snapshot!(screen(&machine_in_row(&lines)));
     lines.push("state=hold tool=out pos=2700 speed_mm_s=0 windows=0 unseen_mm=400");
-    assert_eq!(machine(&lines).rows[0].advice(), None);
+    assert_eq!(machine_in_row(&lines).rows[0].advice(), None);
 }
 
 #[test]
@@ -126,22 +129,21 @@ fn completions_are_offered_below_the_line() {
 #[test]
 fn a_lost_machine_is_shown_as_lost() {
     let mut model = machine(&ROW);
-    model.update(0, Happening::Lost("the port is gone: plug the Uno in again".to_owned()));
+    lose(&mut model, 0);
     insta::assert_snapshot!(screen(&model));
 }
 
 #[test]
 fn a_state_that_is_not_understood_for_a_second_is_unknown_and_so_is_that_before_the_first() {
-    let at_work = "state=work tool=in pos=2196 speed_mm_s=694 windows=1 unseen_mm=0";
-    for lines in [(90, 22), (40, 10)] {
-        let known = |model: &Model| !screen_of(model, lines.0, lines.1).contains("state unknown");
+    for (columns, lines) in SIZES {
+        let known = |model: &Model| !screen_of(model, columns, lines).contains("state unknown");
         let began = Instant::now();
         let mut model = machine(&[]);
         // A newer firmware's state, and nothing else.
         tell(&mut model, 0, &["state=rest tool=away pos=1 speed_mm_s=2 windows=0 unseen_mm=0"]);
         model.turn(began);
-        assert!(!known(&model) && screen_of(&model, lines.0, lines.1).contains("? tool"));
-        tell(&mut model, 0, &[at_work]);
+        assert!(!known(&model) && screen_of(&model, columns, lines).contains("? tool"));
+        tell(&mut model, 0, &[AT_WORK]);
         model.turn(began);
         model.turn(began + Duration::from_secs(1));
         assert!(known(&model));
@@ -184,21 +186,20 @@ fn a_restart_at_work_is_shown_until_the_machine_works_again() {
 
 #[test]
 fn a_lost_machine_shows_no_present_values() {
-    let at_work = "state=work tool=in pos=2196 speed_mm_s=694 windows=1 unseen_mm=0";
-    let mut model = machine(&[&ROW[..], &[at_work]].concat());
+    let mut model = machine_in_row(&[AT_WORK]);
     assert!(screen(&model).contains("██"));
-    for (columns, lines) in [(90, 22), (40, 10)] {
+    for (columns, lines) in SIZES {
         let drawn = screen_of(&model, columns, lines);
-        assert!(drawn.contains("2.50 km/h") && drawn.contains("tool in"), "{drawn}");
+        assert!(drawn.contains("2.00 km/h") && drawn.contains("tool in"), "{drawn}");
     }
-    model.update(0, Happening::Lost("the port is gone".to_owned()));
-    for (columns, lines) in [(90, 22), (40, 10)] {
+    lose(&mut model, 0);
+    for (columns, lines) in SIZES {
         let drawn = screen_of(&model, columns, lines);
         assert!(drawn.contains("speed unknown") && !drawn.contains("km/h") && !drawn.contains('▲'), "{drawn}");
         assert!(!drawn.contains("██"), "{drawn}");
     }
-    tell(&mut model, 0, &[at_work]);
-    assert!(screen(&model).contains("2.50 km/h"));
+    tell(&mut model, 0, &[AT_WORK]);
+    assert!(screen(&model).contains("2.00 km/h"));
 }
 
 #[test]
@@ -234,9 +235,7 @@ fn a_screen_too_small_for_all_of_it_is_drawn_as_far_as_it_goes() {
 
 #[test]
 fn the_drawing_follows_the_machine_s_settings() {
-    let mut lines = ROW.to_vec();
-    lines.push("state=work tool=in pos=2196 speed_mm_s=556 windows=1 unseen_mm=0");
-    let mut model = machine(&lines);
+    let mut model = machine_in_row(&[AT_WORK]);
     let mut settings = Settings::new();
     settings.set(Setting::BeamToToolMm, 800).unwrap();
     let before = screen(&model);
@@ -245,6 +244,9 @@ fn the_drawing_follows_the_machine_s_settings() {
     model.update(0, Happening::Settings(Settings::new(), Vec::new()));
     assert_eq!(screen(&model), before);
 }
+
+/// A screen that shows all of a row, and a small one.
+const SIZES: [(u16, u16); 2] = [(90, 22), (40, 10)];
 
 /// A status of a row at work with keep-out zones, and one of a row in alarm.
 const AT_WORK: &str = "state=work tool=in pos=2196 speed_mm_s=556 windows=1 unseen_mm=0";
@@ -255,12 +257,10 @@ const IN_ALARM: &str =
 fn rows(count: usize) -> Model {
     let mut model = Model::new((1..=count).map(|number| format!("row {number}")).collect());
     for row in 0..count {
-        let mut lines = ROW.to_vec();
-        lines.push(if row == 2 { IN_ALARM } else { AT_WORK });
-        tell(&mut model, row, &lines);
+        tell(&mut model, row, &[&ROW[..], &[if row == 2 { IN_ALARM } else { AT_WORK }]].concat());
     }
     if count > 1 {
-        model.update(count - 1, Happening::Lost("the port is gone: plug the Uno in again".to_owned()));
+        lose(&mut model, count - 1);
     }
     model
 }
@@ -290,14 +290,12 @@ fn six_and_twelve_rows_are_seen_at_a_glance_on_screens_of_both_sizes() {
 
 #[test]
 fn one_row_in_a_small_terminal_keeps_its_state_its_alarm_and_the_key_for_hold() {
-    let mut lines = ROW.to_vec();
-    lines.push(AT_WORK);
-    insta::assert_snapshot!(screen_of(&machine(&lines), 40, 10));
-    insta::assert_snapshot!(screen_of(&machine(&lines), 80, 24));
-    lines.push(IN_ALARM);
-    let mut model = machine(&lines);
+    let mut model = machine_in_row(&[AT_WORK]);
     insta::assert_snapshot!(screen_of(&model, 40, 10));
-    model.update(0, Happening::Lost("the port is gone: plug the Uno in again".to_owned()));
+    insta::assert_snapshot!(screen_of(&model, 80, 24));
+    model = machine_in_row(&[AT_WORK, IN_ALARM]);
+    insta::assert_snapshot!(screen_of(&model, 40, 10));
+    lose(&mut model, 0);
     insta::assert_snapshot!(screen_of(&model, 40, 10));
 }
 
@@ -334,10 +332,9 @@ fn the_row_that_commands_go_to_is_chosen_and_its_answer_is_marked() {
     let refusal = Some("error: alarm latched".to_owned());
     model.update(1, Happening::Answered { number: 1, command: "start".to_owned(), refusal });
     let drawn = screen_of(&model, 80, 24);
-    assert!(
-        drawn.contains("row 2 work  ! in") && drawn.contains("row 2> ") && drawn.contains("> row 2: start"),
-        "{drawn}"
-    );
+    for part in ["row 2 work  ! in", "row 2> ", "> row 2: start"] {
+        assert!(drawn.contains(part), "{drawn}");
+    }
     model.choose(false);
     model.choose(false);
     assert_eq!(model.target, None);
