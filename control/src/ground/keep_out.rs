@@ -234,18 +234,31 @@ mod tests {
 
     const MARGIN: Length = Length(95);
 
+    /// Keep-out zones of these canopies, with the ground known from 0 on.
+    fn with(canopies: &[(i16, i16)]) -> KeepOut {
+        let mut keep_out = KeepOut::NONE;
+        for &(leading, trailing) in canopies {
+            keep_out.push(&canopy(leading, trailing), at(0), MARGIN).expect("there is room");
+        }
+        keep_out
+    }
+
+    fn at(position: i16) -> WrappedPosition {
+        WrappedPosition::new(position)
+    }
+
     fn canopy(leading: i16, trailing: i16) -> Canopy {
-        Canopy { leading: WrappedPosition::new(leading), trailing: WrappedPosition::new(trailing), trim: 0 }
+        Canopy { leading: at(leading), trailing: at(trailing), trim: 0 }
     }
 
     fn closed(keep_out: &KeepOut, from: i16, to: i16) -> bool {
-        keep_out.is_closed(WrappedPosition::new(from), WrappedPosition::new(to), MARGIN)
+        keep_out.is_closed(at(from), at(to), MARGIN)
     }
 
     #[test]
     fn a_zone_reaches_from_margin_to_margin_also_where_the_counter_wraps() {
         for base in [0, i16::MAX - 1100] {
-            let at = |offset: i16| WrappedPosition::new(base.wrapping_add(offset));
+            let at = |offset: i16| at(base.wrapping_add(offset));
             let mut keep_out = KeepOut::new(at(-1000));
             keep_out.push(&Canopy { leading: at(1000), trailing: at(1300), trim: 0 }, at(0), MARGIN).unwrap();
             for (from, to, closed) in [
@@ -271,58 +284,49 @@ mod tests {
         }
         let plant = Detection::whole(1000, 1300);
         assert_eq!(Canopy::of(&plant, Length::ZERO).trim, 0);
-        let mut keep_out = KeepOut::new(WrappedPosition::new(0));
-        keep_out.push(&Canopy::of(&plant, zone), WrappedPosition::new(0), MARGIN).unwrap();
+        let mut keep_out = KeepOut::NONE;
+        keep_out.push(&Canopy::of(&plant, zone), at(0), MARGIN).unwrap();
         assert!(!closed(&keep_out, 931, 931) && closed(&keep_out, 932, 932));
         assert!(closed(&keep_out, 1368, 1368) && !closed(&keep_out, 1369, 1369));
     }
 
     #[test]
     fn unknown_ground_is_closed_with_a_margin_ahead_of_it() {
-        let mut keep_out = KeepOut::new(WrappedPosition::new(0));
-        assert!(closed(&keep_out, -1, -1));
-        assert!(closed(&keep_out, 94, 94));
-        assert!(closed(&keep_out, 94, 100));
-        assert!(!closed(&keep_out, 95, 100));
-        keep_out.push(&canopy(1000, 1300), WrappedPosition::new(0), MARGIN).unwrap();
-        keep_out.invalidate(WrappedPosition::new(1310));
-        assert!(closed(&keep_out, 0, 0) && closed(&keep_out, 1310, 1310));
-        assert!(closed(&keep_out, 1404, 1404));
-        assert!(!closed(&keep_out, 1405, 1405));
-        assert!(!keep_out.has_left(WrappedPosition::new(1000)), "invalid, not dropped");
+        let mut keep_out = with(&[(1000, 1300)]);
+        for (from, to, expected) in [(-1, -1, true), (94, 94, true), (94, 100, true), (95, 100, false)] {
+            assert_eq!(closed(&keep_out, from, to), expected, "{from} to {to}");
+        }
+        keep_out.invalidate(at(1310));
+        for (position, expected) in [(0, true), (1310, true), (1404, true), (1405, false)] {
+            assert_eq!(closed(&keep_out, position, position), expected, "{position}");
+        }
+        assert!(!keep_out.has_left(at(1000)), "invalid, not dropped");
     }
 
     #[test]
     fn a_full_schedule_forgets_only_ground_behind_the_tool() {
-        let mut keep_out = KeepOut::new(WrappedPosition::new(0));
-        for plant in 0..CAPACITY as i16 {
-            keep_out.push(&canopy(plant * 1000, plant * 1000 + 200), WrappedPosition::new(0), MARGIN).unwrap();
-        }
-        assert_eq!(keep_out.push(&canopy(20_000, 20_200), WrappedPosition::new(295), MARGIN), Err(ScheduleFull));
-        assert_eq!(keep_out.push(&canopy(20_000, 20_200), WrappedPosition::new(296), MARGIN), Ok(()));
-        assert!(keep_out.has_left(WrappedPosition::new(199)) && !keep_out.has_left(WrappedPosition::new(200)));
+        let canopies: [_; CAPACITY] = core::array::from_fn(|plant| (1000 * plant as i16, 1000 * plant as i16 + 200));
+        let mut keep_out = with(&canopies);
+        assert_eq!(keep_out.push(&canopy(20_000, 20_200), at(295), MARGIN), Err(ScheduleFull));
+        assert_eq!(keep_out.push(&canopy(20_000, 20_200), at(296), MARGIN), Ok(()));
+        assert!(keep_out.has_left(at(199)) && !keep_out.has_left(at(200)));
         assert!(closed(&keep_out, 294, 294), "forgotten ground is unknown");
         assert!(!closed(&keep_out, 295, 295));
-        let (position, wider) = (WrappedPosition::new(299), Length(100));
-        assert!(keep_out.is_closed(position, position, wider), "its margin is kept, even one that was set later");
+        assert!(keep_out.is_closed(at(299), at(299), Length(100)), "its margin is kept, even one that was set later");
         assert!(closed(&keep_out, 20_000, 20_000));
     }
 
     #[test]
     fn zones_ahead_are_counted_until_the_tool_has_passed_them() {
-        let mut keep_out = KeepOut::new(WrappedPosition::new(0));
-        keep_out.push(&canopy(1000, 1300), WrappedPosition::new(0), MARGIN).unwrap();
-        keep_out.push(&canopy(2000, 2300), WrappedPosition::new(0), MARGIN).unwrap();
-        assert_eq!(keep_out.ahead(WrappedPosition::new(0), MARGIN), 2);
-        assert_eq!(keep_out.ahead(WrappedPosition::new(1395), MARGIN), 2);
-        assert_eq!(keep_out.ahead(WrappedPosition::new(1396), MARGIN), 1);
-        assert_eq!(keep_out.ahead(WrappedPosition::new(2396), MARGIN), 0);
+        let keep_out = with(&[(1000, 1300), (2000, 2300)]);
+        for (tool, ahead) in [(0, 2), (1395, 2), (1396, 1), (2396, 0)] {
+            assert_eq!(keep_out.ahead(at(tool), MARGIN), ahead, "{tool}");
+        }
     }
 
     #[test]
     fn canopies_that_end_in_one_turn_make_room_for_as_many() {
-        let at = WrappedPosition::new;
-        let mut keep_out = KeepOut::new(at(0));
+        let mut keep_out = KeepOut::NONE;
         let mut plants = (0..).map(|plant| canopy(500 * plant, 500 * plant + 50));
         plants.by_ref().take(CAPACITY).for_each(|plant| keep_out.push(&plant, at(0), MARGIN).expect("there is room"));
         keep_out.leave(at(1200));
@@ -335,15 +339,14 @@ mod tests {
 
     #[test]
     fn far_ground_is_dropped_before_the_counter_wraps() {
-        let mut keep_out = KeepOut::new(WrappedPosition::new(0));
-        keep_out.push(&canopy(1000, 1300), WrappedPosition::new(0), MARGIN).unwrap();
+        let mut keep_out = with(&[(1000, 1300)]);
         for step in 1..5000 {
-            let tool = WrappedPosition::new(i16::wrapping_mul(step, 1 << 8));
+            let tool = at(i16::wrapping_mul(step, 1 << 8));
             keep_out.leave(tool - Length(8000));
             assert!(step < 10 || !keep_out.is_closed(tool, tool, MARGIN), "{step}");
             assert_eq!(keep_out.ahead(tool, MARGIN), u8::from(step < 6));
             assert!(!keep_out.has_left(tool));
         }
-        assert!(keep_out.has_left(WrappedPosition::new(i16::wrapping_mul(4999, 1 << 8)) - Length(8001)));
+        assert!(keep_out.has_left(at(i16::wrapping_mul(4999, 1 << 8)) - Length(8001)));
     }
 }

@@ -218,6 +218,13 @@ mod tests {
         saved.into_memory()
     }
 
+    /// The memory after a save whose power failed after this many bytes.
+    fn save_cut(memory: &Volatile, settings: &Settings, power: usize) -> Volatile {
+        let mut failing = memory.clone();
+        failing.lose_power_after(power);
+        save(failing, settings).with_power()
+    }
+
     fn load(memory: &Volatile) -> Option<Settings> {
         SavedSettings::new(memory.clone()).load()
     }
@@ -265,9 +272,7 @@ mod tests {
             }
         }
         for power in 0..=COPY + 1 {
-            let mut failing = memory.clone();
-            failing.lose_power_after(power);
-            assert!(!is_spoiled(&save(failing, &with_k(9)).with_power()), "{power}");
+            assert!(!is_spoiled(&save_cut(&memory, &with_k(9), power)), "{power}");
         }
     }
 
@@ -279,9 +284,7 @@ mod tests {
                 memory = save(memory, &with_k(k + 1));
             }
             for power in 0..=COPY + 1 {
-                let mut failing = memory.clone();
-                failing.lose_power_after(power);
-                let after = load(&save(failing, &with_k(9)).with_power());
+                let after = load(&save_cut(&memory, &with_k(9), power));
                 assert!(after == Some(with_k(before)) || after == Some(with_k(9)), "{power}: {after:?}");
                 assert!(power <= COPY || after == Some(with_k(9)), "complete save");
             }
@@ -300,13 +303,8 @@ mod tests {
                     // A save never overwrites the remaining copy, and never makes the invalid copy valid again. At the power loss,
                     // the byte being written may take any value.
                     let saved = save(corrupted.clone(), &with_k(9)).bytes;
-                    let cut = |power| {
-                        let mut failing = corrupted.clone();
-                        failing.lose_power_after(power);
-                        save(failing, &with_k(9)).with_power()
-                    };
                     for power in 0..=COPY + 1 {
-                        let (before, after) = (cut(power), cut(power + 1));
+                        let [before, after] = [power, power + 1].map(|power| save_cut(&corrupted, &with_k(9), power));
                         let torn = (0..SIZE).find(|&address| before.bytes[address] != after.bytes[address]);
                         let address = torn.unwrap_or(0);
                         let values = [before.bytes[address], after.bytes[address], memory.bytes[address], 0, ERASED];
@@ -352,10 +350,8 @@ mod tests {
     #[test]
     fn correct_bytes_are_not_written_again() {
         let memory = save(save(Volatile::new(), &with_k(5)), &with_k(5));
-        let mut writes_few = memory.clone();
         // The first byte twice, the sequence number and the CRC.
-        writes_few.lose_power_after(5);
-        assert_eq!(save(writes_few, &with_k(5)).bytes, save(memory, &with_k(5)).bytes);
+        assert_eq!(save_cut(&memory, &with_k(5), 5).bytes, save(memory, &with_k(5)).bytes);
         assert_eq!(Volatile::new().bytes[0], ERASED);
     }
 }

@@ -245,72 +245,58 @@ mod tests {
     #[test]
     fn every_command_is_parsed_with_its_arguments() {
         use Action::*;
-        for (line, action) in [
-            (&b"help"[..], Help),
-            (b"status", Status),
-            (b"get", GetAll),
-            (b"save", Save),
-            (b"revert", Revert),
-            (b"defaults", Defaults),
-            (b"calibrate start", CalibrateStart),
-            (b"calibrate servo", CalibrateServo),
-            (b"servo in", ServoIn),
-            (b"servo out", ServoOut),
-            (b"test watchdog", TestWatchdog),
-            (b"plot on", PlotOn),
-            (b"plot off", PlotOff),
-            (b"plot teleplot", PlotTeleplot),
-            (b"start", Start),
-            (b"start now", StartNow),
-            (b"hold", Hold),
-            (b"clear", Clear),
-            (b"events on", EventsOn),
-            (b"events off", EventsOff),
-            (b"label plant", LabelPlant),
-            (b"label weed", LabelWeed),
-            (b"teach plant", TeachPlant),
-            (b"teach weed", TeachWeed),
-            (b"examples", Examples),
-            (b"forget all", ForgetAll),
-            (b"dump", Dump),
-            (b"version", Version),
+        let plain = |action| Command { action, setting: Setting::TicksPerRev, number: 500, force: false };
+        let with = |action, number| Command { number, ..plain(action) };
+        let forced = |command| Command { force: true, ..command };
+        let of = |action, setting| Command { setting, ..plain(action) };
+        let set = |setting, number| Command { setting, ..with(Set, number) };
+        for (line, command) in [
+            (&b"help"[..], plain(Help)),
+            (b"help k", of(Explain, Setting::K)),
+            (b"status", plain(Status)),
+            (b"get", plain(GetAll)),
+            (b"get wheel_mm", of(Get, Setting::WheelMm)),
+            (b"set wheel_mm 405", set(Setting::WheelMm, 405)),
+            (b"  set \t wheel_mm   405 ", set(Setting::WheelMm, 405)),
+            (b"set end_switch on", set(Setting::EndSwitch, 1)),
+            (b"set end_switch off", set(Setting::EndSwitch, 0)),
+            (b"set end_switch 1", set(Setting::EndSwitch, 1)),
+            (b"save", plain(Save)),
+            (b"revert", plain(Revert)),
+            (b"defaults", plain(Defaults)),
+            (b"calibrate start", plain(CalibrateStart)),
+            (b"calibrate servo", plain(CalibrateServo)),
+            (b"calibrate 10000", with(Calibrate, 10_000)),
+            (b"calibrate 10000 force", forced(with(Calibrate, 10_000))),
+            (b"servo in", plain(ServoIn)),
+            (b"servo out", plain(ServoOut)),
+            (b"servo 1750", with(Servo, 1750)),
+            (b"test row", with(TestRow, 500)),
+            (b"test row 700", with(TestRow, 700)),
+            (b"test watchdog", plain(TestWatchdog)),
+            (b"plot on", plain(PlotOn)),
+            (b"plot off", plain(PlotOff)),
+            (b"plot teleplot", plain(PlotTeleplot)),
+            (b"start", plain(Start)),
+            (b"start now", plain(StartNow)),
+            (b"hold", plain(Hold)),
+            (b"clear", plain(Clear)),
+            (b"events on", plain(EventsOn)),
+            (b"events off", plain(EventsOff)),
+            (b"label plant", plain(LabelPlant)),
+            (b"label plant force", forced(plain(LabelPlant))),
+            (b"label weed", plain(LabelWeed)),
+            (b"label weed force", forced(plain(LabelWeed))),
+            (b"teach 255", with(Feature, 255)),
+            (b"teach plant", plain(TeachPlant)),
+            (b"teach weed", plain(TeachWeed)),
+            (b"examples", plain(Examples)),
+            (b"forget 31", with(Forget, 31)),
+            (b"forget all", plain(ForgetAll)),
+            (b"dump", plain(Dump)),
+            (b"version", plain(Version)),
         ] {
-            let parsed = parse(line).map(|command| (command.action, command.force));
-            assert_eq!(parsed, Ok((action, false)), "{}", line.escape_ascii());
-        }
-        for (line, action, number) in [
-            (&b"calibrate 10000"[..], Calibrate, 10_000),
-            (b"servo 1750", Servo, 1750),
-            (b"test row", TestRow, 500),
-            (b"test row 700", TestRow, 700),
-            (b"teach 255", Feature, 255),
-            (b"forget 31", Forget, 31),
-        ] {
-            let parsed = parse(line).map(|command| (command.action, command.number, command.force));
-            assert_eq!(parsed, Ok((action, number, false)), "{}", line.escape_ascii());
-        }
-        for (line, action) in [
-            (&b"calibrate 10000 force"[..], Calibrate),
-            (b"label plant force", LabelPlant),
-            (b"label weed force", LabelWeed),
-        ] {
-            let parsed = parse(line).map(|command| (command.action, command.force));
-            assert_eq!(parsed, Ok((action, true)), "{}", line.escape_ascii());
-        }
-        for (line, action, setting) in [(&b"help k"[..], Explain, Setting::K), (b"get wheel_mm", Get, Setting::WheelMm)]
-        {
-            let parsed = parse(line).map(|command| (command.action, command.setting));
-            assert_eq!(parsed, Ok((action, setting)), "{}", line.escape_ascii());
-        }
-        for (line, setting, value) in [
-            (&b"set wheel_mm 405"[..], Setting::WheelMm, 405),
-            (b"  set \t wheel_mm   405 ", Setting::WheelMm, 405),
-            (b"set end_switch on", Setting::EndSwitch, 1),
-            (b"set end_switch off", Setting::EndSwitch, 0),
-            (b"set end_switch 1", Setting::EndSwitch, 1),
-        ] {
-            let parsed = parse(line).map(|command| (command.action, command.setting, command.number));
-            assert_eq!(parsed, Ok((Set, setting, value)), "{}", line.escape_ascii());
+            assert_eq!(parse(line), Ok(command), "{}", line.escape_ascii());
         }
     }
 
