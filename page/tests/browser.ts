@@ -138,9 +138,20 @@ export async function open(browser: Browser, view: string, viewport = DESK, port
     if (ports) await offerPorts(opened.page, ports);
     const seed = process.env.WEEDER_SEED ?? "1";
     await opened.page.goto(`${pathToFileURL(resolve("dist/index.html")).href}?seed=${seed}#${view}`);
-    await opened.page.waitForFunction(() => "simulation" in globalThis);
+    await isReady(opened.page);
     await still(opened.page);
     return opened;
+}
+
+/** Loads the page again. */
+export async function reload(page: Page): Promise<void> {
+    await page.reload();
+    await isReady(page);
+}
+
+/** Waits until the page is decompressed, and has started. */
+async function isReady(page: Page): Promise<void> {
+    await page.waitForFunction(() => "simulation" in globalThis);
 }
 
 /** A new page. Requests that do not begin with `own` are errors. */

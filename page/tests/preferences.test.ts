@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import test, { after, before } from "node:test";
 import type { Browser, Page } from "playwright-core";
-import { close, launch, open } from "./browser.ts";
+import { close, launch, open, reload } from "./browser.ts";
 import { part, pass, tryIt } from "./trying.ts";
 
 let browser: Browser;
@@ -41,7 +41,7 @@ test("theme, sound and board are kept from one visit to the next", async () => {
     await board.selectOption(options[1] ?? "");
     const chosen = ["true", "light", "false", options[1]];
     assert.deepEqual(await shown(), chosen);
-    await page.reload();
+    await reload(page);
     assert.deepEqual(await shown(), chosen);
     await close(opened);
 });
@@ -50,7 +50,7 @@ test("where little motion is asked for, the machine stands until it is driven, a
     const opened = await open(browser, "work");
     const { page } = opened;
     await page.emulateMedia({ reducedMotion: "reduce" });
-    await page.reload();
+    await reload(page);
     await page.getByRole("link", { name: "Try" }).click();
     assert.equal(await page.locator("#speed-is").textContent(), "0.0 km/h");
     await pass(page, 1);

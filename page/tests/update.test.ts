@@ -7,7 +7,7 @@ import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
 import test, { after, before, type TestContext } from "node:test";
 import type { Browser } from "playwright-core";
-import { close, inspect, launch, type Opened, open, openAt, PHONE, served } from "./browser.ts";
+import { close, inspect, launch, type Opened, open, openAt, PHONE, reload, served } from "./browser.ts";
 import { type Device, VirtualUno } from "./ports.ts";
 
 const FIRMWARE = resolve("../target/avr-none/firmware/weeder-firmware.elf");
@@ -55,8 +55,7 @@ const second = (text: string) => text.replace("<h1>weeder", "<h1>weeder 2");
 async function install(address: string): Promise<Opened> {
     const opened = await openAt(browser, address);
     await opened.page.evaluate(() => navigator.serviceWorker.ready);
-    await opened.page.reload();
-    await opened.page.waitForFunction(() => "simulation" in globalThis);
+    await reload(opened.page);
     return opened;
 }
 
