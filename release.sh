@@ -66,7 +66,8 @@ build_for_another() {
     local linker=CARGO_TARGET_${system^^}_LINKER libraries=''
     [ -z "$exe" ] || libraries=-lws2_32
     env CC="$gnu-gcc" AR="$gnu-ar" RANLIB="$gnu-ranlib" LDFLAGS="$libraries" C_LIBELF='' LD_LIBELF='' C_LIBDWARF='' LD_LIBDWARF='' \
-        PKG_CONFIG_ALLOW_CROSS=1 PKG_CONFIG_LIBDIR="$empty" BINDGEN_EXTRA_CLANG_ARGS="-isystem /usr/$gnu/include" \
+        PKG_CONFIG_ALLOW_CROSS=1 PKG_CONFIG_LIBDIR="$empty" \
+        "BINDGEN_EXTRA_CLANG_ARGS_${system//-/_}=-isystem /usr/$gnu/include" \
         "${linker//-/_}=$gnu-gcc" cargo build --locked --release --package weeder-cli --target "$system"
 }
 
