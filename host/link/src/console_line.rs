@@ -4,7 +4,9 @@
 //! part is [`ConsoleLine::Other`]. This module does not know which command a line answers. A setting's name, range and
 //! unit are read from the line, not from this version's table.
 
-use super::event_line::{Counts, EventLine, Fields, LineDescription, Status, ValueDescription, kind};
+use super::event_line::{
+    Counts, EventLine, Fields, LineDescription, Status, ValueDescription, is_name, is_of_a_name, kind,
+};
 use control::ground::class::Class;
 use control::ground::features::COUNT;
 
@@ -219,14 +221,6 @@ fn value(word: &str) -> Option<u16> {
         "off" => Some(0),
         number => number.parse().ok(),
     }
-}
-
-fn is_of_a_name(character: char) -> bool {
-    character.is_ascii_alphanumeric() || character == '_'
-}
-
-pub(crate) fn is_name(word: &str) -> bool {
-    !word.is_empty() && word.chars().all(is_of_a_name)
 }
 
 /// `NUMBER`, or `NUMBER (COMMIT)`.

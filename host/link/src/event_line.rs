@@ -10,7 +10,6 @@ mod values;
 pub use self::field::{Field, Fields};
 pub use self::values::Values;
 use self::values::behind;
-use crate::console_line::is_name;
 use control::alarm::{Alarm, Warning};
 use control::ground::class::Class;
 use control::operate::calibration::{Outcome, SwingTimes};
@@ -241,6 +240,14 @@ impl Mode {
     pub fn name(self) -> &'static str {
         self.into()
     }
+}
+
+pub(super) fn is_of_a_name(character: char) -> bool {
+    character.is_ascii_alphanumeric() || character == '_'
+}
+
+pub(super) fn is_name(word: &str) -> bool {
+    !word.is_empty() && word.chars().all(is_of_a_name)
 }
 
 /// Whether a line has the form of an event: its name, then a value with its key. No line of an answer has.
