@@ -349,9 +349,26 @@ pub(crate) mod tests {
         ticks - PULSE_TICKS * (hidden(0..pulse) - hidden(pulse..0)) - in_pulse
     }
 
-    /// The firmware's count after these changes.
+    /// Counts of a decoder that takes each pair of levels as they come.
     fn decode(changes: &[PinChange]) -> i64 {
-        counts(&[], changes).last().copied().unwrap()
+        const FORWARD: [(bool, bool); 4] = [(false, false), (true, false), (true, true), (false, true)];
+        let phase = |levels| FORWARD.iter().position(|&pair| pair == levels).unwrap();
+        let (mut levels, mut count) = ((false, false), 0);
+        for change in changes {
+            let before = phase(levels);
+            match change.pin {
+                wiring::ENCODER_A => levels.0 = change.high,
+                wiring::ENCODER_B => levels.1 = change.high,
+                _ => continue,
+            }
+            count += match (phase(levels) + 4 - before) % 4 {
+                0 => 0,
+                1 => 1,
+                3 => -1,
+                _ => panic!("both channels changed at once"),
+            };
+        }
+        count
     }
 
     fn of_pin(changes: &[PinChange], pin: Pin) -> Vec<PinChange> {

@@ -424,6 +424,17 @@ mod tests {
     }
 
     #[test]
+    fn a_wheel_that_slips_turns_farther_than_the_machine_rolls() {
+        let motion = Motion::steady(0.0, 1000.0, 500.0, 1900.0).with_slip(|| 0.05);
+        assert!((motion.wheel_mm(motion.duration_s()) - 2000.0).abs() < 1e-9);
+        assert_eq!(motion.end_mm(), 1900.0);
+        let passings = motion.mark_passings(10.0, 0.0);
+        assert_eq!(passings.len(), 200);
+        let hundredth = motion.position_mm(passings[99].time_s);
+        assert!((hundredth - 995.0 * 0.95).abs() < 1e-6, "{hundredth} mm");
+    }
+
+    #[test]
     fn a_wheel_slips_from_the_given_time_on() {
         let motion = Motion::starting_at(0.0).change_speed(500.0, 1000.0).until(0.25).slipping(0.05);
         let motion = motion.change_speed(500.0, 1000.0).until(3.0);

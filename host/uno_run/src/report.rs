@@ -188,7 +188,7 @@ pub struct PlantRecord {
     out_error_ticks: Option<f64>,
     in_error_ticks: Option<f64>,
     swings: usize,
-    verdict: String,
+    verdict: &'static str,
 }
 
 /// The result for a tall weed, as a line of a table.
@@ -211,7 +211,12 @@ pub fn plants(outcome: &Outcome) -> Vec<PlantRecord> {
         out_error_ticks: plant.out_error_ticks,
         in_error_ticks: plant.in_error_ticks,
         swings: plant.swings,
-        verdict: plant.verdict.to_string().to_lowercase().replace(' ', "_"),
+        verdict: match plant.verdict {
+            Verdict::Kept => "kept",
+            Verdict::MarginCut => "margin_cut",
+            Verdict::Reached => "zone_reached",
+            Verdict::Damaged => "damaged",
+        },
     };
     outcome.judgement.plants.iter().map(record).collect()
 }
