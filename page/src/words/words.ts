@@ -1,14 +1,14 @@
 // The page in the operator's language: its texts, its numbers and its units.
 //
-// Each language has a table of texts. en.ts is the source. The page's HTML has the English texts, and `translate` finds
-// them there. Texts that were set by `show` or `translate` change with the language. Other texts must be written again
-// by their own module.
+// Each language has a table of texts: en.ts is the source, and the translations are JSON, which editors for translators
+// open. The page's HTML has the English texts, and `translate` finds them there. Texts that were set by `show` or
+// `translate` change with the language. Other texts must be written again by their own module.
 
 import { chosen, keep } from "../preferences.ts";
 import * as en from "./en.ts";
-import * as es from "./es.ts";
-import * as fr from "./fr.ts";
-import * as hi from "./hi.ts";
+import es from "./es.json";
+import fr from "./fr.json";
+import hi from "./hi.json";
 
 export type Word = keyof typeof en.words;
 /** The keys of texts without placeholders. */
