@@ -36,9 +36,12 @@ function firmware() {
     return hex;
 }
 
-/** The project's Rust as WebAssembly. */
+/** The firmware's commit, which only a release names. */
+const { WEEDER_COMMIT: commit = "", ...environment } = process.env;
+
+/** The project's Rust as WebAssembly. It does not see the commit, so a new one compiles nothing. */
 function rust() {
-    execFileSync("cargo", ["page", "--quiet"], { stdio: "inherit" });
+    execFileSync("cargo", ["page", "--quiet"], { stdio: "inherit", env: environment });
     return join(target, "wasm32-unknown-unknown/page/page.wasm");
 }
 
@@ -107,6 +110,7 @@ const common = {
         "log-worker.js": await logWorker(),
         "faults.json": faults(),
     },
+    define: { COMMIT: JSON.stringify(commit && ` (${commit})`) },
     loader: { ".txt": "text", ".deflated": "binary" },
 };
 
@@ -124,7 +128,7 @@ if (what === "page") {
     const { outputFiles = [] } = await build({
         ...page,
         entryPoints: ["src/start.ts", "src/page.css"].map((path) => ({ in: path, out: "page" })),
-        define: { BUILD: '"{BUILD}"' },
+        define: { ...common.define, BUILD: '"{BUILD}"' },
         write: false,
     });
     const built = Object.fromEntries(outputFiles.map(({ path, text }) => [basename(path), text]));

@@ -17,3 +17,6 @@ declare module "faults.json" {
 
 /** This build of the page: the hash of its files (build.mjs). */
 declare const BUILD: string;
+
+/** The firmware's commit behind its version: empty, or as in " (abc1234)". */
+declare const COMMIT: string;

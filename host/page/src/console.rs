@@ -45,15 +45,9 @@ fn camel_case(name: &str) -> String {
     name.split('_').enumerate().map(word).collect()
 }
 
-/// The firmware of these sources: its version, and its settings' names. A release's version includes the commit
-/// (`control/src/say/version.rs`).
+/// The firmware of these sources: its version without the commit (build.mjs has it), and its settings' names.
 pub fn firmware() -> Value {
-    let number = env!("CARGO_PKG_VERSION");
-    let version = match option_env!("WEEDER_COMMIT") {
-        Some(commit) if !commit.is_empty() => format!("{number} ({commit})"),
-        _ => number.to_owned(),
-    };
-    json!({ "version": version, "settings": Setting::all().map(name).collect::<Vec<_>>() })
+    json!({ "version": env!("CARGO_PKG_VERSION"), "settings": Setting::all().map(name).collect::<Vec<_>>() })
 }
 
 /// All present settings, and the ones to change, by name.

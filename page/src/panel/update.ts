@@ -14,6 +14,7 @@ const KEPT = "settings";
 
 export class Update {
     readonly #own = askRust<{ readonly version: string; readonly settings: readonly string[] }>("firmware");
+    readonly #version = this.#own.version + COMMIT;
 
     /** `flash` opens the view for flashing. */
     constructor(
@@ -48,7 +49,7 @@ export class Update {
         const names = settings.map(({ name }) => name);
         const gone = names.filter((name) => !this.#own.settings.includes(name));
         const added = this.#own.settings.filter((name) => !names.includes(name));
-        return { gone, added, isOwn: version === this.#own.version && gone.length + added.length === 0 };
+        return { gone, added, isOwn: version === this.#version && gone.length + added.length === 0 };
     }
 
     /** The stored settings that differ from the machine's. */
@@ -63,7 +64,7 @@ export class Update {
         this.parts.html("update").hidden = !isOther;
         if (isOther) {
             const said = () => [
-                say("otherFirmware", { theirs: version, ours: this.#own.version }),
+                say("otherFirmware", { theirs: version, ours: this.#version }),
                 gone.length > 0 && say("settingsGone", { names: gone.join(", ") }),
                 added.length > 0 && say("settingsAdded", { names: added.join(", ") }),
                 gone.length + added.length > 0 && say("settingsLost"),

@@ -371,6 +371,23 @@ fn where_an_answer_may_be_late_hold_is_typed_at_once_and_again_behind_the_first_
     assert!(session.turn(now, b"ok\r\n").happened.contains(&answered));
 }
 
+#[test]
+fn a_device_that_never_ends_its_answer_is_given_up_after_each_try_s_longest_time() {
+    let (mut session, mut now) = (Session::default(), Moment::default());
+    session.open(false);
+    let mut asked = Vec::new();
+    while session.is_open() {
+        if sends(&mut session, &mut now, "x").contains(VERSION) {
+            asked.push(now.ticking);
+        }
+        assert!(now.ticking < Duration::from_secs(60), "{asked:?}");
+    }
+    let try_time = LONGEST_SETTLING + ANSWER_TIME + Duration::from_millis(100);
+    assert_eq!(asked.len(), 3);
+    assert!(asked.iter().chain([&now.ticking]).is_sorted_by(|one, next| *next - *one <= try_time), "{asked:?}");
+    assert_matches!(session.take_failure(), Some(LinkError::Silent { .. }));
+}
+
 /// What a caller knows of a command.
 #[derive(Clone, Debug, Default)]
 struct Known {
