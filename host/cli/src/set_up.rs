@@ -11,13 +11,14 @@ mod state;
 use self::state::State;
 use crate::input::{self, Line};
 use crate::ports::Port;
-use anyhow::{Context, Error, Result};
+use anyhow::{Context, Error, Result, bail};
 use clap::Args;
+use control::alarm::Alarm;
 use files::{bounded_file, whole_file};
 use frame::{say, source, tell};
 use link::row_names::Board;
-use link::settings::{self, Setting, name, range, unit};
-use link::{ConsoleLine, EventLine, Link, LinkError, Mode};
+use link::settings::{self, Setting, SettingsError, name, range, unit};
+use link::{ConsoleLine, EventLine, Link, LinkError, Mode, Status, advice};
 use mechanics::design::Design;
 use mechanics::machine::{Input, Machine};
 use mechanics::swing::Swing;
@@ -118,10 +119,17 @@ struct Guide {
 
 impl Guide {
     fn lead(mut self) -> Result<()> {
-        if settings::status(&mut self.link)?.mode == Mode::Alarm {
-            // A new board has no saved settings, which is an alarm. This saves the present ones.
-            self.link.ask("save")?;
-            self.link.ask("clear")?;
+        match settings::status(&mut self.link)? {
+            // A new board has no saved settings. This saves the present ones.
+            Status { alarm: Some(Alarm::SettingsLost), .. } => {
+                self.link.ask("save")?;
+                self.link.ask("clear")?;
+            }
+            Status { alarm: Some(alarm), .. } => {
+                bail!("the machine has the alarm {}: {}; then go on", advice::name(alarm), advice::alarm(alarm))
+            }
+            Status { mode: Mode::Alarm, .. } => bail!("the machine has an alarm that this version does not know"),
+            _ => {}
         }
         self.link.ask("events on")?;
         say!("Enter takes what stands in [brackets], s leaves a step out, q stops.")?;
@@ -270,22 +278,30 @@ impl Guide {
         }
         let needs_stroke = tasks.iter().any(|task| matches!(task, Task::Set(Setting::StemZoneMm, _)));
         let calculated = if needs_stroke { self.calculated()? } else { Vec::new() };
-        let mut wanted = Vec::new();
         for task in tasks {
             match *task {
                 Task::Fit("machine.tool_width_mm", _) => self.measure_tool()?,
-                // Its setting is asked for.
-                Task::Fit(..) => {}
-                Task::Set(setting, _) => {
-                    let offered = calculated.iter().find(|(offered, _)| *offered == setting).map(|&(_, value)| value);
-                    wanted.push((setting, self.value(setting, offered)?));
-                }
+                // Settings are asked for below.
+                Task::Fit(..) | Task::Set(..) => {}
                 Task::TimeServo => self.time_servo()?,
                 Task::MeasureWheel(length_mm) => self.measure_wheel(length_mm)?,
                 Task::SetMargin => self.set_margin()?,
             }
         }
-        self.push(&wanted)
+        // Until they do not contradict the others.
+        loop {
+            let mut wanted = Vec::new();
+            for task in tasks {
+                let Task::Set(setting, _) = *task else { continue };
+                let offered = calculated.iter().find(|(offered, _)| *offered == setting).map(|&(_, value)| value);
+                wanted.push((setting, self.value(setting, offered)?));
+            }
+            let pushed = self.push(&wanted);
+            match pushed.as_ref().map_err(Error::downcast_ref) {
+                Err(Some(error @ SettingsError::Contradiction(_))) => tell!("  error: {error}"),
+                _ => return pushed,
+            }
+        }
     }
 
     /// Shows the detections as they come.
@@ -302,7 +318,12 @@ impl Guide {
             Some(machine) => machine,
             None => {
                 let question = "Calculate them from your arm, tool and servo, or type them: yes, no";
-                if !self.ask_for(question, Some("yes"), |typed| Ok(typed == "yes"))? {
+                let is_yes = |typed: &str| match typed.to_lowercase().as_str() {
+                    "yes" | "y" => Ok(true),
+                    "no" | "n" => Ok(false),
+                    _ => Err("type yes or no, s or q".to_owned()),
+                };
+                if !self.ask_for(question, Some("yes"), is_yes)? {
                     return Ok(Vec::new());
                 }
                 for (name, question) in ASKED {
@@ -314,7 +335,7 @@ impl Guide {
         };
         let torque = Design::of(&machine)?.servo_torque;
         let swing = match Swing::of(&machine, torque) {
-            Ok(swing) => swing,
+            Ok(swing) => swing.fitted(&settings::read(&mut self.link)?),
             Err(problem) => {
                 tell!("  The tool cannot swing as it has to: {problem}.");
                 return Ok(Vec::new());

@@ -12,7 +12,7 @@
 
 use crate::machine::{Machine, SwingInputs};
 use crate::unit::{KG_CM, MM};
-use link::settings::Setting;
+use link::settings::{Setting, Settings};
 use serde::Serialize;
 use set_up::{circle, saved_ms};
 use uom::si::f64::{Time, Torque};
@@ -122,6 +122,20 @@ impl Swing {
         })
     }
 
+    /// The same stroke from where the tool was fitted in the row, and to the same side. Settings with the default pulses
+    /// tell neither.
+    #[must_use]
+    pub fn fitted(mut self, settings: &Settings) -> Self {
+        let pulses = [Setting::ServoInUs, Setting::ServoOutUs];
+        if pulses.iter().any(|&pulse| settings.get(pulse) != pulse.description().default) {
+            let stroke_us = self.servo_out_us - self.servo_in_us;
+            let [in_us, out_us] = pulses.map(|pulse| u32::from(settings.get(pulse)));
+            self.servo_in_us = in_us;
+            self.servo_out_us = if out_us < in_us { in_us.saturating_sub(stroke_us) } else { in_us + stroke_us };
+        }
+        self
+    }
+
     /// The settings that follow.
     pub fn settings(&self) -> Vec<(&'static str, u32)> {
         let pulses = [("servo_in_us", self.servo_in_us), ("servo_out_us", self.servo_out_us)];
@@ -212,5 +226,22 @@ mod tests {
             stem.sentences(&machine, torque)[0].starts_with("The tool clears a stem's zone of 90 mm at 17."),
             "{stem:?}"
         );
+    }
+
+    #[test]
+    fn a_stroke_begins_where_the_tool_was_fitted_and_goes_to_the_same_side() {
+        let swing = Swing::with_tool(&Machine::default(), KG_CM.of(10.0), 100.0).expect("it swings");
+        for (fitted, pulses) in [
+            ([1500, 2000], [1500, 1795]),
+            ([1620, 2000], [1620, 1915]),
+            ([1480, 1000], [1480, 1185]),
+            ([1500, 2100], [1500, 1795]),
+        ] {
+            let mut settings = Settings::new();
+            settings.set(Setting::ServoInUs, fitted[0]).expect("it is in its range");
+            settings.set(Setting::ServoOutUs, fitted[1]).expect("it is in its range");
+            let fitted = swing.fitted(&settings);
+            assert_eq!([fitted.servo_in_us, fitted.servo_out_us], pulses);
+        }
     }
 }
