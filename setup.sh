@@ -25,8 +25,15 @@ for word in "$@"; do
             page=yes
             # An installed Node.js is often from another source, and conflicts with Debian's.
             if ! command -v npm >/dev/null; then packages+=(nodejs npm); fi
-            if ! command -v chromium >/dev/null; then packages+=(chromium); fi
-            if ! command -v firefox-esr >/dev/null; then packages+=(firefox-esr); fi
+            for browser in chromium firefox-esr; do
+                if command -v "$browser" >/dev/null; then
+                    continue
+                elif grep -qsE '^ID(_LIKE)?=.*ubuntu' /etc/os-release; then
+                    echo "Packages: Ubuntu has no $browser. Only the page's tests need it."
+                else
+                    packages+=("$browser")
+                fi
+            done
             # The page's tests measure texts in Hindi.
             if [ -z "$(fc-list :lang=hi 2>/dev/null)" ]; then packages+=(fonts-lohit-deva); fi
             ;;

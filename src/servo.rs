@@ -29,14 +29,16 @@ impl Servo {
     pub fn new(timer: TC1, port: &PORTB, width: HalfMicros) -> Self {
         // The pin before the timer, so that the first pulse is complete.
         port.ddrb.modify(|_, w| w.pb1().set_bit());
-        // ICR1 before the mode, so that the counter always has a top.
-        timer.icr1.write(|w| w.bits(FRAME - 1));
+        // OCR1A before the mode: in mode 14 a new one takes effect at the next restart.
         timer.ocr1a.write(|w| w.bits(compare(width)));
-        timer.tcnt1.write(|w| w.bits(FRAME - 2));
         // WGM11 and WGM10 of mode 14.
         timer.tccr1a.write(|w| w.com1a().match_clear().wgm1().bits(0b10));
-        // WGM13 and WGM12 of mode 14.
-        timer.tccr1b.write(|w| w.wgm1().bits(0b11).cs1().prescale_8());
+        // WGM13 and WGM12 of mode 14. Only a mode with ICR1 as its top lets it be written (data sheet, 16.6.3).
+        timer.tccr1b.write(|w| w.wgm1().bits(0b11));
+        timer.icr1.write(|w| w.bits(FRAME - 1));
+        timer.tcnt1.write(|w| w.bits(FRAME - 2));
+        // The clock last, so that the counter has a top.
+        timer.tccr1b.modify(|_, w| w.cs1().prescale_8());
         Self { timer, width }
     }
 

@@ -275,8 +275,9 @@ impl Settings {
     /// # Errors
     /// As [`set`](Self::set).
     pub fn change(&mut self, setting: Setting, value: u16) -> Result<(), OutOfRange> {
+        let before = self.get(setting);
         self.set(setting, value)?;
-        if setting.is_of_the_wheel() {
+        if setting.is_of_the_wheel() && value != before {
             self.set(Setting::TicksPerM, 0)?;
         }
         Ok(())

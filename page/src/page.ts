@@ -161,11 +161,11 @@ globalThis.addEventListener("beforeunload", (event) => {
     if (workPanels.some(({ isNeeded }) => isNeeded)) event.preventDefault();
 });
 
-/** The key for HOLD, for every shown machine. */
+/** The key for HOLD: for the simulated machine while it is shown, and for every real one in each view. */
 globalThis.addEventListener("keydown", ({ key }) => {
     if (key !== "Escape") return;
     if (!page.html("view-try").hidden) tryPanel.hold();
-    else for (const panel of workPanels) panel.hold();
+    for (const panel of workPanels) panel.hold();
 });
 
 /** Light or dark as in the system, or always light, for sunlight. */

@@ -97,7 +97,7 @@ export const words = {
     settingsAdded: "It has {names} as well.",
     settingsLost: "The Uno loses its settings by that.",
     settingsToFile: "Its settings go to a file first. Those that are lost can be put back afterwards.",
-    hadSettings: "This Uno had other settings before it was flashed.",
+    hadSettings: "The Uno that was flashed here had other settings. If it is this one, put them back.",
     putThemBack: "Put them back",
     dropThem: "Drop them",
     notAllPutBack: "Not all of them could be restored: check Settings.",
