@@ -72,7 +72,19 @@ pub(super) fn calling_out(port: &str) -> String {
 /// Whether two names lead to the same port.
 #[must_use]
 pub fn is_same(one: &str, other: &str) -> bool {
-    calling_out(&resolved(one)) == calling_out(&resolved(other))
+    is_name_of(&calling_out(&resolved(one)), &calling_out(&resolved(other)), IGNORES_CASE)
+}
+
+/// Whether a name is the port's own, and not a link to it.
+pub(super) fn is_own_name(name: &str, port: &SerialPortInfo) -> bool {
+    is_name_of(&calling_out(name), &port.port_name, IGNORES_CASE)
+}
+
+/// Windows opens COM3 as com3 too.
+const IGNORES_CASE: bool = cfg!(windows);
+
+fn is_name_of(one: &str, other: &str, ignores_case: bool) -> bool {
+    one == other || ignores_case && one.eq_ignore_ascii_case(other)
 }
 
 /// The path of a port that a link may lead to.
@@ -173,7 +185,8 @@ pub(super) fn open(name: &str) -> Result<(Box<dyn SerialPort>, bool), LinkError>
 
 /// Opens a port at this rate, also while it is claimed.
 fn open_at(name: &str, baud: u32) -> Result<(Box<dyn SerialPort>, bool), LinkError> {
-    let mut port = serialport::new(name, baud).timeout(PATIENCE).open().map_err(|error| explain(name, error))?;
+    let mut port =
+        serialport::new(name, baud).timeout(PATIENCE).open().map_err(|error| explain(name, error, listed))?;
     // This modem line resets an Uno. A pseudo terminal has none.
     let resets = port.write_data_terminal_ready(true).is_ok();
     Ok((port, resets))
@@ -237,17 +250,26 @@ pub fn open_other(name: &str) -> Result<Box<dyn crate::Port>, LinkError> {
 /// If it is absent, in use, forbidden, or no serial port.
 pub fn listen(name: &str, baud: u32) -> Result<Box<dyn Read + Send>, LinkError> {
     let port = serialport::new(name, baud).timeout(Duration::from_millis(1)).open();
-    Ok(Box::new(port.map_err(|error| explain(name, error))?))
+    Ok(Box::new(port.map_err(|error| explain(name, error, listed))?))
 }
 
-fn explain(name: &str, error: serialport::Error) -> LinkError {
+fn explain(
+    name: &str,
+    error: serialport::Error,
+    listed: impl FnOnce() -> Result<Vec<SerialPortInfo>, LinkError>,
+) -> LinkError {
     let name = name.to_owned();
+    // The file system of Windows has no ports. Its list also has those in use.
+    let exists = || {
+        std::fs::exists(&name).unwrap_or(false)
+            || listed().is_ok_and(|ports| ports.iter().any(|port| is_same(&port.port_name, &name)))
+    };
     match error.kind() {
         ErrorKind::Io(io::ErrorKind::PermissionDenied) => LinkError::Forbidden(name),
         ErrorKind::Io(io::ErrorKind::ResourceBusy) => LinkError::Busy(name),
         ErrorKind::Io(io::ErrorKind::NotFound) => LinkError::Absent(name),
         // The port exists but is no device: another program has locked it.
-        ErrorKind::NoDevice if std::fs::exists(&name).unwrap_or(false) => LinkError::Busy(name),
+        ErrorKind::NoDevice if exists() => LinkError::Busy(name),
         ErrorKind::NoDevice => LinkError::Absent(name),
         _ => LinkError::NotOpened { port: name, source: error },
     }
@@ -351,9 +373,25 @@ pub(super) mod tests {
     }
 
     #[test]
+    fn a_port_that_only_the_list_has_is_in_use_and_another_one_is_absent() {
+        // As Windows says of both.
+        let error = || serialport::Error::new(ErrorKind::NoDevice, "Access is denied.");
+        let ports = || Ok(vec![usb("COM3", UNOS[1], None)]);
+        assert!(matches!(explain("COM3", error(), ports), LinkError::Busy(port) if port == "COM3"));
+        assert!(matches!(explain("COM4", error(), ports), LinkError::Absent(port) if port == "COM4"));
+    }
+
+    #[test]
+    fn case_makes_another_port_except_on_windows() {
+        assert!(is_name_of("com3", "COM3", true) && !is_name_of("com3", "COM30", true));
+        assert!(!is_name_of("/dev/ttyacm0", "/dev/ttyACM0", false));
+        assert_eq!(is_same("com3", "COM3"), cfg!(windows));
+    }
+
+    #[test]
     fn a_forbidden_port_is_an_error_with_its_group() {
         let denied = serialport::Error::new(ErrorKind::Io(io::ErrorKind::PermissionDenied), "Permission denied");
-        let error = explain("/dev/ttyACM0", denied).to_string();
+        let error = explain("/dev/ttyACM0", denied, || Ok(Vec::new())).to_string();
         assert!(error.contains("`sudo usermod -aG dialout $USER`) and log in again"), "{error}");
     }
 }

@@ -6,7 +6,7 @@
 //!
 //! Only [`Board::open`] opens a port. Only [`Names::write`] changes the file.
 
-use super::port::{calling_out, is_same, listed, name_at};
+use super::port::{is_own_name, is_same, listed, name_at};
 use super::settings_file::no_toml;
 use super::{Link, LinkError, Wire, find_uno};
 use files::{FileError, bounded_file, whole_file};
@@ -96,7 +96,7 @@ impl Board {
         // The list of ports has the link's present target.
         match ports.iter().find(|listed| is_same(&listed.port_name, port)) {
             // A user's own link may lead to another port some day.
-            Some(listed) if serial_number(listed).is_some() || listed.port_name == calling_out(port) => {
+            Some(listed) if serial_number(listed).is_some() || is_own_name(port, listed) => {
                 Ok(of(listed, &ports, Path::new(BY_PLACE)))
             }
             None if !path.exists() => Err(LinkError::Absent(port.to_owned())),
