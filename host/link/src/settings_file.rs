@@ -116,7 +116,10 @@ fn updated(path: &Path, old: &str, shown: &Shown) -> Result<String, FileError> {
     } else {
         ""
     };
-    if let Some((key, item)) = document.remove_entry(OLD_MERGE_GAP) {
+    // A machine without the new name shows the old one, and its value stays in ticks.
+    if !shown.missing.contains(&Setting::MergeGapMm)
+        && let Some((key, item)) = document.remove_entry(OLD_MERGE_GAP)
+    {
         // Moves its comments as well.
         document.insert_formatted(&Key::new(name(Setting::MergeGapMm)).with_leaf_decor(key.leaf_decor().clone()), item);
     }
@@ -248,6 +251,17 @@ mod tests {
         let old = "# ragged leaves\nmerge_gap_ticks = 60 # three were too few\n";
         let new = updated(Path::new("machine.toml"), old, &shown(Settings::new())).unwrap();
         assert!(new.starts_with("# ragged leaves\nmerge_gap_mm = 21 # three were too few\n"), "{new}");
+        let ticks = OtherSetting {
+            name: OLD_MERGE_GAP.to_owned(),
+            value: 40,
+            range: 0..=2000,
+            is_switched: false,
+            unit: "ticks".to_owned(),
+        };
+        let of_its_version = Shown { missing: vec![Setting::MergeGapMm], others: vec![ticks], ..Shown::default() };
+        let new = updated(Path::new("machine.toml"), old, &of_its_version).unwrap();
+        assert!(new.starts_with("# ragged leaves\nmerge_gap_ticks = 40 # three were too few\n"), "{new}");
+        assert_eq!(gap(&new), Some((Setting::MergeGapMm, 21)));
     }
 
     #[test]
