@@ -166,9 +166,8 @@ pub struct Job {
     pub jumps: Vec<(u64, Jump)>,
     /// How often the receiver was lost, by the record.
     pub unplugged: u64,
-    /// The midnight from which [`Found::utc_ms`] counts, in milliseconds since 1970. `None` if the receiver sent no
-    /// date.
-    pub midnight_ms: Option<i64>,
+    /// For each session, the midnight from which [`Found::utc_ms`] counts.
+    midnights_ms: Vec<Option<i64>>,
     /// The offsets of beam and tool that were used.
     pub antenna: Antenna,
     /// The wheel's distance against the receiver's, for each straight stretch.
@@ -189,11 +188,15 @@ impl Job {
             let followed = follower.take(entry);
             let is_cut = matches!(followed, Followed::Linked | Followed::Status(_, false));
             // An earlier time: the log was closed, and opened again.
-            if is_cut || reading.time_ms.as_ref().is_some_and(|range| entry.time_ms < range.end) {
+            let is_opened = reading.time_ms.as_ref().is_some_and(|range| entry.time_ms < range.end);
+            if is_cut || is_opened {
                 if matches!(followed, Followed::Linked) {
                     reading.restart(entry, &log[at..]);
                 }
                 job.end(&mut receiver, &mut reading, entry, wanted);
+            }
+            if is_opened {
+                receiver.log_opened();
             }
             match followed {
                 Followed::Status(status, _) => {
@@ -233,7 +236,7 @@ impl Job {
             job.end(&mut receiver, &mut reading, last, wanted);
         }
         job.counts = receiver.counts;
-        job.midnight_ms = receiver.midnight_ms();
+        job.midnights_ms = receiver.midnights_ms();
         job
     }
 
@@ -303,6 +306,11 @@ impl Job {
             Event::mark(EventKind::WheelSpun, text, wheel[at].line, to.fix.time_ms, at_m)
         };
         spins.iter().map(event).collect()
+    }
+
+    /// The time of a position, in milliseconds since 1970. `None` if the receiver sent no date in that session.
+    pub fn utc_ms(&self, found: &Found) -> Option<i64> {
+        Some((*self.midnights_ms.get(found.session)?)? + found.utc_ms)
     }
 
     /// Everything that happened.

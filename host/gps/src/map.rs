@@ -42,8 +42,7 @@ fn feature(kind: &str, geometry: Option<Geometry>, properties: Vec<(&str, JsonVa
 fn event(job: &Job, event: &Event) -> Feature {
     let found = event.found.ok();
     // In the form of ISO 8601 that QGIS accepts; null without a date, or for an invalid one.
-    let utc_ms = found.zip(job.midnight_ms).map(|(found, midnight)| midnight + found.utc_ms);
-    let time = utc_ms.and_then(DateTime::from_timestamp_millis);
+    let time = found.and_then(|found| job.utc_ms(&found)).and_then(DateTime::from_timestamp_millis);
     let mut properties = vec![
         ("time", time.map(|time| time.to_rfc3339_opts(SecondsFormat::Millis, true)).into()),
         ("record_s", rounded(event.time_ms as f64 / 1000.0)),

@@ -5,8 +5,10 @@
 //! fixes and marks.
 //!
 //! - **Moments.** RMC and GGA of the same time are one fix, at the position with more digits. It is returned when the
-//!   next moment begins, or by [`Receiver::end`]. A time that jumps back by half a day or more is past midnight.
-//! - **Date.** The one on which most lines agree, with the midnights between them. It may be wrong in some.
+//!   next moment begins, or by [`Receiver::end`]. A time belongs to the day on which it agrees best with the log's clock.
+//! - **Date.** Each session has its own: the one on which most of its lines agree, with the midnights between them. It
+//!   may be wrong in some lines. A session ends when the log is opened again, and when the receiver's time and the log's
+//!   clock part by more than the longest delay. So it does where the PC slept, and where the receiver finds the time.
 //! - **Time.** A line comes some time after its moment. The delay varies, because other lines go first on the wire and
 //!   the PC is busy. The receiver uses the shortest delay of the last ten or twenty seconds, since the real delay
 //!   cannot be longer. The antenna's setting `delay_ms` covers the rest. If the delay rises by whole seconds and stays,
@@ -55,6 +57,7 @@ const STEP_JITTER_MS: f64 = 300.0;
 #[derive(Clone, Copy, Debug, Default)]
 struct Moment {
     arrived_ms: f64,
+    /// Since the midnight before the session's first line.
     utc_ms: i64,
     place: Option<Place>,
     /// The last digit of the position in metres.
@@ -102,10 +105,8 @@ pub struct Receiver {
     /// The marks that the caller has not taken yet.
     pub marks: Vec<Mark>,
     moment: Option<Moment>,
-    /// Midnights since the first line.
-    days: i64,
-    /// How many lines have which day as that of the first line, from 1970.
-    first_days: BTreeMap<i64, u64>,
+    /// For each session, how many lines have which day as that of its first line, from 1970.
+    first_days: Vec<BTreeMap<i64, u64>>,
     least_ahead: LeastAhead,
     /// The last moment that has its time, in UTC.
     timed_utc_ms: i64,
@@ -126,12 +127,14 @@ impl Receiver {
         Self { error_m, ..Self::default() }
     }
 
-    /// The midnight from which the fixes' [`Fix::utc_ms`] counts, in milliseconds since the first of January 1970.
-    /// `None` if no date is that of most lines.
-    pub fn midnight_ms(&self) -> Option<i64> {
-        let all: u64 = self.first_days.values().sum();
-        let (day, _) = self.first_days.iter().find(|(_, lines)| 2 * **lines > all)?;
-        Some(day * DAY_MS)
+    /// For each session, the midnight from which [`Fix::utc_ms`] counts, in milliseconds since the first of January
+    /// 1970. `None` if no date is that of most of its lines.
+    pub fn midnights_ms(&self) -> Vec<Option<i64>> {
+        let midnight_ms = |first_days: &BTreeMap<i64, u64>| {
+            let all: u64 = first_days.values().sum();
+            first_days.iter().find(|(_, lines)| 2 * **lines > all).map(|(day, _)| day * DAY_MS)
+        };
+        self.first_days.iter().map(midnight_ms).collect()
     }
 
     /// Reports the wheel's total distance at a time of the log's clock, and its speed in mm/s.
@@ -167,6 +170,12 @@ impl Receiver {
         self.release();
     }
 
+    /// The log is opened again: the next line begins a session.
+    pub fn log_opened(&mut self) {
+        self.end();
+        self.moment = None;
+    }
+
     /// The receiver is gone or silent.
     pub fn silent(&mut self) {
         self.end();
@@ -179,26 +188,37 @@ impl Receiver {
             self.complete();
             return self.no_fix();
         };
-        let before_ms = self.moment.map(|moment| moment.utc_ms.rem_euclid(DAY_MS));
-        let is_near = |moment: Moment| arrived_ms - moment.arrived_ms < LONGEST_DELAY_MS;
-        if before_ms != Some(time_ms) || !self.moment.is_some_and(is_near) {
-            // Past midnight forward, or back over it for a receiver that has only now found the time.
-            let before_ms = before_ms.unwrap_or(time_ms);
-            self.days += i64::from(time_ms < before_ms - DAY_MS / 2) - i64::from(time_ms > before_ms + DAY_MS / 2);
+        let utc_ms = self.utc_ms(arrived_ms, time_ms);
+        let is_its =
+            |moment: Moment| utc_ms == Some(moment.utc_ms) && arrived_ms - moment.arrived_ms < LONGEST_DELAY_MS;
+        if !self.moment.is_some_and(is_its) {
             self.complete();
-            let (utc_ms, wheel) = (self.days * DAY_MS + time_ms, self.wheel);
+            if utc_ms.is_none() {
+                self.release();
+                self.least_ahead.forget();
+                self.first_days.push(BTreeMap::new());
+            }
+            let (utc_ms, wheel) = (utc_ms.unwrap_or(time_ms), self.wheel);
             let new = Moment { arrived_ms, utc_ms, wheel, digit_m: f64::INFINITY, is_valid: true, ..Moment::default() };
             self.moment = Some(new);
         }
-        if let Some(day) = report.day {
-            *self.first_days.entry(day - self.days).or_default() += 1;
-        }
         let Some(moment) = &mut self.moment else { return };
+        if let (Some(day), Some(first_days)) = (report.day, self.first_days.last_mut()) {
+            *first_days.entry(day - moment.utc_ms.div_euclid(DAY_MS)).or_default() += 1;
+        }
         moment.is_valid &= report.place.is_some();
         if report.place.is_some() && report.digit_m < moment.digit_m {
             (moment.place, moment.digit_m) = (report.place, report.digit_m);
         }
         moment.quality = moment.quality.max(report.quality);
+    }
+
+    /// A time of day on the day on which it agrees best with the log's clock. `None` if a session begins with it.
+    fn utc_ms(&self, arrived_ms: f64, time_ms: i64) -> Option<i64> {
+        let last = self.moment?;
+        let days = ((arrived_ms - last.ahead_ms() - time_ms as f64) / DAY_MS as f64).round() as i64;
+        let utc_ms = days * DAY_MS + time_ms;
+        ((arrived_ms - utc_ms as f64 - last.ahead_ms()).abs() <= LONGEST_DELAY_MS).then_some(utc_ms)
     }
 
     fn no_fix(&mut self) {
@@ -267,8 +287,9 @@ impl Receiver {
         let digits_m = moment.digit_m / 3_f64.sqrt();
         let error_m = self.error_m.unwrap_or_else(|| quality.usual_error_m()).hypot(digits_m);
         let (utc_ms, track) = (moment.utc_ms, self.track);
+        let session = self.first_days.len().saturating_sub(1);
         let wheel = moment.wheel.filter(|wheel| time_ms - wheel.time_ms <= WHEEL_GAP_MS);
-        let fix = Fix { time_ms, utc_ms, place, quality, error_m, track };
+        let fix = Fix { time_ms, utc_ms, session, place, quality, error_m, track };
         let rolled_m = wheel.map_or(0.0, |wheel| {
             // The wheel is reported ten times a second. A line that came much too late has a position that is no longer
             // known here.
@@ -368,7 +389,9 @@ mod tests {
             prop_assert_eq!(fixes.len(), 40);
             prop_assert_eq!(receiver.counts, Counts { fixes: 40, ..Counts::default() });
             prop_assert_eq!(marks, &[Mark::Found(Quality::Rtk)]);
-            let midnight_ms = receiver.midnight_ms().expect("RMC has a date");
+            let midnights_ms = receiver.midnights_ms();
+            prop_assert_eq!(midnights_ms.len(), 1);
+            let midnight_ms = midnights_ms[0].expect("RMC has a date");
             for (second, pair) in fixes.windows(2).enumerate() {
                 prop_assert_eq!(midnight_ms + pair[0].utc_ms, start_ms + 1000 * second as i64);
                 let far_m = pair[0].place.distance_m(pair[1].place);
@@ -447,6 +470,6 @@ mod tests {
         let mut receiver = Receiver::new(None);
         (0..5).for_each(|second| receiver.take(1000.0 * f64::from(second), &framed("GPRMC,,V,,,,,,,,,,N")));
         assert_eq!(receiver.marks, [Mark::Lost]);
-        assert_eq!(receiver.midnight_ms(), None);
+        assert_eq!(receiver.midnights_ms(), []);
     }
 }

@@ -97,6 +97,8 @@ pub struct Found {
     pub error_m: f64,
     /// The time when the antenna was there, in milliseconds UTC as in the fixes.
     pub utc_ms: i64,
+    /// The session of that time, as in the fixes.
+    pub session: usize,
 }
 
 /// A fix on the track, or the mean of several of a standing wheel.
@@ -171,9 +173,12 @@ impl Track {
             error_m = error_m.hypot(beside_m * heading_error);
         }
         // The wheel stands at the beginning of the pair, and at its end.
+        let session = from.fix.session;
         let began = from.fix.utc_ms as f64 + (from.until_ms - from.fix.time_ms);
-        let utc_ms = began + share * (to.fix.utc_ms as f64 - began);
-        Ok(Found { place: self.plane.place(at), basis, error_m, utc_ms: utc_ms.round() as i64 })
+        let passed_ms =
+            if to.fix.session == session { to.fix.utc_ms as f64 - began } else { to.fix.time_ms - from.until_ms };
+        let utc_ms = (began + share * passed_ms).round() as i64;
+        Ok(Found { place: self.plane.place(at), basis, error_m, utc_ms, session })
     }
 
     /// The first of the two fixes between which the wheel passed this distance for the last time before the event was
@@ -316,7 +321,7 @@ mod tests {
         let fix = |(second, distance_m): (usize, f64)| {
             let (time_ms, utc_ms) = (1000.0 * second as f64, 1000 * second as i64);
             let place = plane.place(at(distance_m));
-            (distance_m, Fix { time_ms, utc_ms, place, quality: Quality::Rtk, error_m: 0.015, track: 0 })
+            (distance_m, Fix { time_ms, utc_ms, session: 0, place, quality: Quality::Rtk, error_m: 0.015, track: 0 })
         };
         distances_m.into_iter().enumerate().map(fix).collect()
     }

@@ -3,7 +3,7 @@
 
 use gps::plane::{Metres, Place, Plane};
 use gps::receiver::Mark;
-use gps::sentence::{Quality, framed};
+use gps::sentence::{DAY_MS, Quality, framed};
 use gps::track::Basis;
 use gps::{Antenna, Job, Recorder, Wanted, playback};
 use link::Status;
@@ -16,6 +16,10 @@ use std::path::Path;
 /// The machine's speed in mm/s, and ticks in a metre.
 const SPEED: f64 = 690.0;
 const TICKS_PER_M: u16 = 2000;
+
+/// The 14th of June 2026 in days from 1970, and a quarter past ten of it in milliseconds.
+const DAY: i64 = 20_618;
+const BEGAN_MS: i64 = 1_781_432_100_000;
 
 /// The log of a file of a receiver beside a machine. The wheel gives `wheel` metres for each metre at a time in
 /// seconds, and has a plant each metre. There are no statuses during `gap_s`.
@@ -62,6 +66,14 @@ fn case(name: &str) -> Vec<u8> {
 
 fn marks(log: &[Entry]) -> Vec<&str> {
     log.iter().filter(|entry| entry.kind == Kind::GpsMark).map(|entry| entry.text.as_str()).collect()
+}
+
+/// The days of the events with a position, from 1970, without repetition.
+fn days(job: &Job) -> Vec<Option<i64>> {
+    let mut days: Vec<_> = job.events().filter_map(|event| event.found.ok()).map(|found| job.utc_ms(&found)).collect();
+    days.iter_mut().for_each(|day| *day = day.map(|utc_ms| utc_ms.div_euclid(DAY_MS)));
+    days.dedup();
+    days
 }
 
 /// The greatest distance of an event from the machine's true line, and of the events' errors, in metres.
@@ -123,10 +135,42 @@ fn zeros_are_no_fix_and_the_true_ones_after_them_are_all_used() {
 
 #[test]
 fn a_date_that_one_line_has_is_not_that_of_the_map() {
-    let day = |name| Job::read(&recorded(&case(name), steady, 0.0..0.0), &Wanted::default()).midnight_ms;
-    // The 14th of June 2026.
-    assert_eq!(day("last-date-1024-weeks-back.nmea"), Some(1_781_395_200_000));
-    assert_eq!(day("gap-of-an-hour.nmea"), None);
+    let days = |name| days(&Job::read(&recorded(&case(name), steady, 0.0..0.0), &Wanted::default()));
+    assert_eq!(days("last-date-1024-weeks-back.nmea"), [Some(DAY)]);
+    assert_eq!(days("gap-of-an-hour.nmea"), [None]);
+}
+
+#[test]
+fn a_record_that_is_continued_has_the_date_of_each_session() {
+    let file = |began_ms: i64| {
+        sent_from(began_ms, |_, texts| texts.iter().flat_map(|text| (framed(text) + "\r\n").into_bytes()).collect())
+    };
+    let is_right = |log: &[Entry], began_ms: [i64; 2]| {
+        let job = Job::read(log, &Wanted::default());
+        let mut placed = [0; 2];
+        for (number, stretch) in job.stretches.iter().enumerate() {
+            for event in &stretch.events {
+                let Ok(found) = event.found else { continue };
+                // Each file has 12 s.
+                let since_s = event.distance_m / (SPEED / 1000.0) + 12.0 * number as f64;
+                let session = usize::from(since_s >= 12.0);
+                let utc_ms = began_ms[session] + (1000.0 * (since_s % 12.0)) as i64;
+                assert!(job.utc_ms(&found).is_some_and(|it| (it - utc_ms).abs() < 200), "{began_ms:?}: {event:?}");
+                placed[session] += 1;
+            }
+        }
+        assert!(placed.into_iter().all(|placed| placed > 8), "{placed:?}");
+    };
+    let hours = |hours: [f64; 2]| hours.map(|hours| DAY * DAY_MS + (hours / 24.0 * DAY_MS as f64) as i64);
+    // The next morning, two nights, the same day after more than half a day, the same time a day later, and the day after
+    // a midnight at work.
+    for began_ms in [[18.0, 32.0], [18.0, 56.0], [0.5, 14.0], [10.0, 34.0], [23.999, 32.0]].map(hours) {
+        is_right(&began_ms.map(|began_ms| recorded(&file(began_ms), steady, 0.0..0.0)).concat(), began_ms);
+    }
+    // The PC sleeps, and the log's clock stands still.
+    for began_ms in [[18.0, 32.0], [0.5, 14.0], [23.999, 32.0]].map(hours) {
+        is_right(&recorded(&began_ms.map(file).concat(), steady, 0.0..0.0), began_ms);
+    }
 }
 
 #[test]
@@ -140,11 +184,16 @@ fn a_file_without_positions_is_refused_with_what_would_be_right() {
 
 /// RMC and GGA of 60 fixes, as the cases have them. `change` gets their number and both texts, without frame.
 fn sent(change: impl Fn(i64, [String; 2]) -> Vec<u8>) -> Vec<u8> {
+    sent_from(BEGAN_MS, change)
+}
+
+/// The same from this moment on, in milliseconds from 1970.
+fn sent_from(began_ms: i64, change: impl Fn(i64, [String; 2]) -> Vec<u8>) -> Vec<u8> {
     let plane = Plane::around(Place { latitude: 51.5, longitude: 0.1 });
     let fix = |number: i64| {
         let place = plane.place(Metres::toward(73.0) * (0.2 * SPEED / 1000.0 * number as f64));
         let fix = Some((place, Quality::Rtk));
-        let utc_ms = 1_781_432_100_000 + 200 * number;
+        let utc_ms = began_ms + 200 * number;
         change(number, [gps::simulated::rmc(utc_ms, fix), gps::simulated::gga(utc_ms, fix)])
     };
     (0..60).flat_map(fix).collect()
@@ -222,12 +271,12 @@ proptest! {
         let (off_m, error_m) = off_m(&job);
         prop_assert!(off_m < 0.012 && error_m < 0.04, "{} m off, error {}", off_m, error_m);
         prop_assert!(job.events().all(|event| event.found.is_ok()));
-        prop_assert_eq!(job.midnight_ms, Some(1_781_395_200_000));
+        prop_assert_eq!(days(&job), [Some(DAY)]);
     }
 
     #[test]
     fn a_clock_that_steps_back_puts_no_plant_off(at in 15..40_i64, by_s in 1..18_i64, is_lost in any::<bool>()) {
-        let utc_ms = |number: i64| 1_781_432_100_000 + 200 * number - if number >= at { 1000 * by_s } else { 0 };
+        let utc_ms = |number: i64| BEGAN_MS + 200 * number - if number >= at { 1000 * by_s } else { 0 };
         let plane = Plane::around(Place { latitude: 51.5, longitude: 0.1 });
         let mut receiver = gps::receiver::Receiver::new(None);
         for number in 0..60 {
@@ -270,7 +319,7 @@ fn a_wheel_that_spins_is_marked_and_does_not_count_for_its_ratio() {
     for number in 0..250_i64 {
         let place = plane.place(Metres { east: true_m(0.2 * number as f64), north: 0.0 });
         let fix = Some((place, Quality::Rtk));
-        file.extend((framed(&gps::simulated::gga(1_781_432_100_000 + 200 * number, fix)) + "\r\n").into_bytes());
+        file.extend((framed(&gps::simulated::gga(BEGAN_MS + 200 * number, fix)) + "\r\n").into_bytes());
     }
     let job = Job::read(&recorded(&file, steady, 0.0..0.0), &Wanted::default());
     assert!((job.spun_m - 6.9).abs() < 0.7, "{}", job.spun_m);

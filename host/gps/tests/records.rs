@@ -217,7 +217,7 @@ fn a_change_of_the_wheel_begins_a_new_stretch() {
 fn another_wheel_has_no_calibration_yet_and_revert_brings_the_old_one_back() {
     let mut log = whole();
     let set = vec![
-        (Kind::Command, "set wheel_mm 400"),
+        (Kind::Command, "set wheel_mm 410"),
         (Kind::Answer, "ok"),
         (Kind::Command, "revert"),
         (Kind::Answer, "ok"),
@@ -254,13 +254,22 @@ fn a_label_lies_where_the_last_object_does_and_a_refused_one_is_none() {
         (Kind::Answer, "error: there is no object to label"),
     ];
     insert(&mut log, said);
+    let labels = |job: &Job| -> Vec<EventKind> {
+        job.events().map(|event| event.kind).filter(|kind| matches!(kind, EventKind::Label(_))).collect()
+    };
+    // The firmware takes capital letters.
+    for (line, class) in [("LABEL PLANT", Class::Plant), (" Label  weed force", Class::Weed)] {
+        let mut log = whole();
+        insert(&mut log, vec![(Kind::Command, line), (Kind::Answer, "ok")]);
+        assert_eq!(labels(&Job::read(&log, &Wanted::default())), [EventKind::Label(class)], "{line}");
+    }
     let job = Job::read(&log, &Wanted::default());
     let events: Vec<_> = job.events().collect();
     let at = events.iter().position(|event| matches!(event.kind, EventKind::Label(_))).expect("a label");
     assert_eq!(events[at].kind, EventKind::Label(Class::Weed));
     let object = events[..at].iter().rev().find(|event| is_detection(event)).expect("an object");
     assert_eq!((object.found, object.distance_m), (events[at].found, events[at].distance_m));
-    assert_eq!(events.iter().filter(|event| matches!(event.kind, EventKind::Label(_))).count(), 1);
+    assert_eq!(labels(&job).len(), 1);
 }
 
 proptest! {

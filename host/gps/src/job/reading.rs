@@ -3,6 +3,7 @@
 use super::{Did, Event, EventKind, Ground};
 use crate::receiver::{Fix, WHEEL_GAP_MS};
 use crate::track::STANDING_M;
+use control::say::command::Action;
 use link::settings::Setting;
 use link::{Class, EventLine, Mode, Status};
 use logbook::follower::Follower;
@@ -155,9 +156,11 @@ impl Reading {
 
     /// Takes a command that the machine has carried out.
     pub(super) fn label(&mut self, command: &Entry) {
-        let mut words = command.text.split_whitespace();
-        let (Some("label"), Some(class)) = (words.next(), words.next()) else { return };
-        let class = if class == "plant" { Class::Plant } else { Class::Weed };
+        let class = match link::command(&command.text).map(|command| command.action) {
+            Ok(Action::LabelPlant) => Class::Plant,
+            Ok(Action::LabelWeed) => Class::Weed,
+            _ => return,
+        };
         let is_detection = |event: &&Event| matches!(event.kind, EventKind::Detection { .. });
         let Some(detection) = self.events.iter().rev().find(is_detection).cloned() else { return };
         let (line, time_ms, text) = (command.number, command.time_ms, command.text.clone());

@@ -9,8 +9,10 @@ use std::fmt;
 pub struct Fix {
     /// By the record's clock, in milliseconds, less the receiver's own delay.
     pub time_ms: f64,
-    /// Milliseconds UTC since a midnight, see [`midnight_ms`](super::Receiver::midnight_ms).
+    /// Milliseconds UTC since its session's midnight, see [`midnights_ms`](super::Receiver::midnights_ms).
     pub utc_ms: i64,
+    /// The number of its session, from 0.
+    pub session: usize,
     /// Where the antenna was.
     pub place: Place,
     /// How good it is.

@@ -203,7 +203,7 @@ fn places_come_back_within_the_receivers_error_through_outages_jumps_and_damaged
     let weed =
         job.events().find(|event| (event.distance_m - label.distance_m).abs() < 1e-9).expect("it is an object's");
     assert_eq!((weed.found, label.time_ms > weed.time_ms), (label.found, true));
-    let utc_ms = job.midnight_ms.expect("RMC has a date") + label.found.expect("it has a place").utc_ms;
+    let utc_ms = job.utc_ms(&label.found.expect("it has a place")).expect("RMC has a date");
     assert!((30_000..60_000).contains(&(utc_ms - setup.began_ms)), "{utc_ms}");
 
     let summary = Summary::of(&job, &Stand { row_spacing_mm: 600.0, spacing_mm: None });
