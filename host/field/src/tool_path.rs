@@ -54,7 +54,7 @@ pub struct Effect {
     pub plants: u32,
     /// Crop plants through whose protected zone the tool passed.
     pub damaged: u32,
-    /// Damaged plants that the beam cannot see: too low, bent, eaten, or planted late.
+    /// Plants, damaged or swept, that the beam cannot see: too low, bent, eaten, or planted late.
     pub unseen: u32,
     /// All plants that the beam cannot see.
     pub all_unseen: u32,
@@ -79,7 +79,7 @@ impl Effect {
     /// Injured plants that the beam can see, and all of these. A beam's machine has no means to spare the others.
     pub fn injured_of_seen(&self) -> (u32, u32) {
         let seen = self.plants - self.all_unseen;
-        ((self.damaged - self.unseen + self.swept + self.neighbours).min(seen), seen)
+        ((self.damaged + self.swept + self.neighbours - self.unseen).min(seen), seen)
     }
 }
 
@@ -111,12 +111,11 @@ pub fn effect(
     let all_unseen = stand.stems.iter().filter(|stem| !stem.is_seen).count() as u32;
     let mut effect = Effect { plants: stand.stems.len() as u32, all_unseen, ..Effect::default() };
     for stem in &stand.stems {
-        if swinging.damages(stem) {
-            effect.damaged += 1;
-            effect.unseen += u32::from(!stem.is_seen);
-        } else if sweep_cuts(stem, mechanism, steering) {
-            effect.swept += 1;
-        }
+        let is_damaged = swinging.damages(stem);
+        let is_swept = !is_damaged && sweep_cuts(stem, mechanism, steering);
+        effect.damaged += u32::from(is_damaged);
+        effect.swept += u32::from(is_swept);
+        effect.unseen += u32::from(!stem.is_seen && (is_damaged || is_swept));
     }
     let is_cut = |stem: &&Stem| swinging.reaches(stem) && swinging.damages(stem);
     effect.neighbours = stand.neighbours.iter().filter(is_cut).count() as u32;
@@ -290,16 +289,23 @@ pub(crate) mod tests {
     #[test]
     fn a_machine_that_strays_cuts_plants_with_its_sweeps() {
         // The zone ends 10 mm from the sweeps.
-        let cut = |within_mm: f64| {
-            let seeds = (0..100).map(|seed| {
+        let effect = |within_mm: f64, is_seen: bool| {
+            let mut stand = stand();
+            stand.stems[0].is_seen = is_seen;
+            let mut effect = Effect::default();
+            for seed in 0..100 {
                 let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
                 let steering = Steering::within(within_mm, 0.0, -1000.0..3000.0, &mut rng);
-                steered(&stand(), &steering, 800.0, 1100.0).swept
-            });
-            seeds.sum::<u32>()
+                effect += steered(&stand, &steering, 800.0, 1100.0);
+            }
+            effect
         };
-        assert_eq!((cut(0.0), cut(9.9)), (0, 0));
-        assert!((5..60).contains(&cut(20.0)), "{}", cut(20.0));
+        assert_eq!((effect(0.0, true).swept, effect(9.9, true).swept), (0, 0));
+        let [seen, unseen] = [true, false].map(|is_seen| effect(20.0, is_seen));
+        let cut = seen.swept;
+        assert!((5..60).contains(&cut), "{cut}");
+        assert_eq!((seen.unseen, seen.injured_of_seen()), (0, (cut, 100)));
+        assert_eq!((unseen.unseen, unseen.injured_of_seen()), (cut, (0, 0)), "the beam sees none of them");
     }
 
     #[test]
