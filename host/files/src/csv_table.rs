@@ -18,6 +18,8 @@ pub struct CsvTable {
     separator: u8,
     header: StringRecord,
     lines: Vec<(u64, StringRecord)>,
+    /// Whether a comma of a number can only be a decimal one.
+    has_decimal_comma: bool,
 }
 
 /// What may separate the cells of a line, the usual one first.
@@ -107,7 +109,9 @@ impl CsvTable {
         if lines.is_empty() {
             return Err(at(header_line, "no line is below the header: add at least one".to_owned()));
         }
-        Ok(Self { path: path.into(), separator, header, lines })
+        let is_decimal = |cell: &str| with_point(cell) != cell && !may_be_thousands(cell);
+        let has_decimal_comma = separator != b',' && lines.iter().flat_map(|(_, line)| line).any(is_decimal);
+        Ok(Self { path: path.into(), separator, header, lines, has_decimal_comma })
     }
 
     /// The lines below the header, at least one.
@@ -150,13 +154,17 @@ fn declared_separator(text: &str) -> Option<u8> {
     (key.eq_ignore_ascii_case("sep=") && is_rest_empty).then_some(separator)
 }
 
+/// Whether a line may stand above the header: a note, a line without text, or one that declares the separator.
+pub fn is_above_header(line: &str) -> bool {
+    let line = line.trim_start_matches('\u{feff}').trim_end();
+    line.trim_start_matches(['"', ' ']).starts_with('#')
+        || line.trim_matches([',', ';', '\t', '"', ' ']).is_empty()
+        || declared_separator(line).is_some()
+}
+
 /// The separator with which the header has most of the columns, or at least most cells.
 fn guessed_separator(text: &str, columns: &[&str]) -> u8 {
-    let is_header = |line: &&str| {
-        let cells = line.trim_start_matches(['"', ' ']);
-        !cells.starts_with('#') && !cells.trim_matches([',', ';', '\t', '"', ' ']).is_empty()
-    };
-    let header = text.lines().find(is_header).unwrap_or_default();
+    let header = text.lines().find(|line| !is_above_header(line)).unwrap_or_default();
     let named = |separator: u8| {
         let cells: Vec<&str> =
             header.split(char::from(separator)).map(|cell| cell.trim().trim_matches('"').trim()).collect();
@@ -224,14 +232,18 @@ impl Line<'_> {
     /// not separate the fields, a number may have a decimal comma.
     ///
     /// # Errors
-    /// If the text is none.
+    /// If the text is none, or if its comma may be one of thousands, and no number of the table has another comma.
     pub fn value<T: FromStr>(&self, column: &str, right: &str) -> Result<T, FileError> {
         let text = self.text(column);
         let point = if self.table.separator == b',' { text.into() } else { with_point(text) };
         let whole =
             || point.split_once('.').filter(|(_, zeros)| zeros.bytes().all(|digit| digit == b'0'))?.0.parse().ok();
-        point.parse().ok().or_else(whole).ok_or_else(|| {
-            let hint = if self.table.separator == b',' && with_point(text) != text {
+        let is_unclear = may_be_thousands(text) && !self.table.has_decimal_comma;
+        let value = if is_unclear { None } else { point.parse().ok().or_else(whole) };
+        value.ok_or_else(|| {
+            let hint = if is_unclear {
+                "; its comma may be one of thousands: write the number without it, or with a decimal point"
+            } else if self.table.separator == b',' && with_point(text) != text {
                 "; decimal commas need semicolons or tabs between the fields"
             } else {
                 ""
@@ -254,6 +266,13 @@ fn with_point(text: &str) -> Cow<'_, str> {
         is_digits(digits) && is_digits(decimals)
     };
     if text.split_once(',').is_some_and(is_number) { text.replace(',', ".").into() } else { text.into() }
+}
+
+/// Whether this may be an English number from 1,000 to 999,999, and is not certain to have decimals.
+fn may_be_thousands(text: &str) -> bool {
+    let digits = text.trim_start_matches(['-', '+']);
+    let groups = digits.split_once(',').map(|(thousands, rest)| (thousands.len(), rest.len()));
+    matches!(groups, Some((1..=3, 3))) && !digits.starts_with('0') && with_point(text) != text
 }
 
 #[cfg(test)]
@@ -341,6 +360,33 @@ mod tests {
         }
         assert_eq!(read("place_mm,width_mm,width_mm\n7,1,8\n"), Ok(vec![(2, 7)]), "it is not read");
         assert_eq!(read("place_mm,pot\n7,\"5\"\", clay\"\n8,5\" clay\n"), Ok(vec![(2, 7), (3, 8)]));
+    }
+
+    #[test]
+    fn a_comma_that_may_be_one_of_thousands_is_refused_unless_another_number_shows_what_it_is() {
+        let read = |text: &str| {
+            let table = CsvTable::parse(Path::new("table.csv"), text.into(), &["place_mm"]).unwrap();
+            let places = table.lines().map(|line| line.value::<f64>("place_mm", "a number"));
+            let counts = table.lines().map(|line| line.value::<u16>("count", "a whole number"));
+            let values = places.zip(counts).map(|(place, count)| Ok((place?, count?)));
+            values.collect::<Result<Vec<_>, FileError>>().map_err(|error| error.to_string())
+        };
+        for (text, values) in [
+            ("place_mm;count\n12,125;1,000\n0,125;2", vec![(12.125, 1), (0.125, 2)]),
+            ("place_mm;count\n12,125;1,000\n750;2,0", vec![(12.125, 1), (750.0, 2)]),
+            ("place_mm\tcount\n-1200,5\t12,0", vec![(-1200.5, 12)]),
+            ("place_mm\tcount\n1.200\t1000", vec![(1.2, 1000)]),
+        ] {
+            assert_eq!(read(text), Ok(values), "{text:?}");
+        }
+        for (text, wrong) in [
+            ("place_mm\tcount\n750\t1\n1,250\t2", "line 3: place_mm is `1,250`: it has to be a number; its comma"),
+            ("place_mm;count\n0.5;1,000", "line 2: count is `1,000`: it has to be a whole number; its comma may be"),
+            ("place_mm,count\n\"-1,250\",1", "; its comma may be one of thousands: write the number without it"),
+        ] {
+            let error = read(text).unwrap_err();
+            assert!(error.contains(wrong), "{error}");
+        }
     }
 
     #[test]

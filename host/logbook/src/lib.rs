@@ -6,6 +6,7 @@
 //!
 //! The log is not trusted: a line may be damaged, cut short or from another version. It also compiles for a browser.
 
+mod disk;
 pub mod follower;
 pub mod log;
 pub mod replay;

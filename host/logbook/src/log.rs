@@ -3,12 +3,15 @@
 //! The columns are `time_ms` since the log was opened, `kind` and `line`. `line` is the firmware's own text. The log
 //! also holds the machine's version, settings and examples at each connection, so that it can be replayed alone. It
 //! holds the output of a satellite receiver as lines whose kind begins with `gps`. Each line is written before the next
-//! is read. So a power failure damages at most the last line.
+//! is read, and saved to the disk within about a second. So a power failure costs at most the last lines, and the next
+//! session removes one that is cut off.
 
+use crate::disk::Disk;
+use files::csv_table::is_above_header;
 use files::{CsvTable, FileError, in_a_line};
 use link::session::Happening;
 use std::fs::{File, OpenOptions};
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io::{self, ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use strum::{EnumString, IntoStaticStr, VariantNames};
@@ -61,17 +64,47 @@ pub enum LogError {
     /// The file is no log.
     #[error("{0} exists already and is no log: choose another name")]
     NoLog(PathBuf),
+    /// The lines of two programs would damage each other.
+    #[error("another program writes {0}: end that one, or choose another name")]
+    Shared(PathBuf),
 }
 
-/// The end of the last whole line.
-fn end(bytes: &[u8]) -> usize {
-    bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1)
+/// The end of the last whole line. One of these bytes ends a line.
+fn end(bytes: &[u8], ends: &[u8]) -> usize {
+    bytes.iter().rposition(|byte| ends.contains(byte)).map_or(0, |end| end + 1)
+}
+
+/// Opens the file of a log. Fails with [`ErrorKind::WouldBlock`] if another program writes it.
+fn open_alone(path: &Path) -> io::Result<File> {
+    let mut options = OpenOptions::new();
+    options.read(true).write(true).create(true).truncate(false);
+    #[cfg(windows)]
+    {
+        use std::os::windows::fs::OpenOptionsExt;
+        /// Others may read. A lock of Windows would keep them out too.
+        const FILE_SHARE_READ: u32 = 1;
+        const ERROR_SHARING_VIOLATION: i32 = 32;
+        options.share_mode(FILE_SHARE_READ).open(path).map_err(|error| match error.raw_os_error() {
+            Some(ERROR_SHARING_VIOLATION) => ErrorKind::WouldBlock.into(),
+            _ => error,
+        })
+    }
+    #[cfg(not(windows))]
+    {
+        let file = options.open(path)?;
+        // Some file systems have no locks.
+        match file.try_lock() {
+            Err(std::fs::TryLockError::WouldBlock) => Err(ErrorKind::WouldBlock.into()),
+            _ => Ok(file),
+        }
+    }
 }
 
 /// Writes a log.
 pub struct LogWriter {
     path: PathBuf,
     file: csv::Writer<File>,
+    disk: Disk,
     began: Instant,
     /// Lines below the header that were found at opening.
     found: u64,
@@ -83,22 +116,29 @@ impl LogWriter {
     /// Opens a log. An existing one is continued.
     ///
     /// # Errors
-    /// If the file cannot be written, or is something else.
+    /// If the file cannot be written, is something else, or is written by another program.
     pub fn open(path: &Path) -> Result<Self, LogError> {
         let failed = |source| FileError::unwritten(path, source);
-        let mut file =
-            OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path).map_err(failed)?;
+        let mut file = open_alone(path).map_err(|error| match error.kind() {
+            ErrorKind::WouldBlock => LogError::Shared(path.into()),
+            _ => failed(error).into(),
+        })?;
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes).map_err(failed)?;
         if !bytes.is_empty() && !bytes.starts_with(HEADER.as_bytes()) {
             return Err(LogError::NoLog(path.into()));
         }
         // Removes a last line that a power failure has cut off. It would damage the next line.
-        let whole = end(&bytes);
+        // A spreadsheet may have saved it with another line end.
+        const ENDS: &[u8] = b"\r\n";
+        let whole = end(&bytes, ENDS);
         file.set_len(whole as u64).and_then(|()| file.seek(SeekFrom::End(0))).map_err(failed)?;
-        let found = bytes[..whole].iter().filter(|&&byte| byte == b'\n').count().saturating_sub(1) as u64;
-        let mut log =
-            Self { path: path.into(), file: csv::Writer::from_writer(file), began: Instant::now(), found, added: 0 };
+        let lines = bytes[..whole].split(|byte| ENDS.contains(byte)).filter(|line| !line.is_empty());
+        let found = lines.count().saturating_sub(1) as u64;
+        let saved = file.try_clone().map_err(failed)?;
+        let disk = Disk::new(move || saved.sync_data()).map_err(failed)?;
+        let file = csv::Writer::from_writer(file);
+        let mut log = Self { path: path.into(), file, disk, began: Instant::now(), found, added: 0 };
         if whole == 0 {
             log.record(HEADER.split(','))?;
         }
@@ -159,6 +199,7 @@ impl LogWriter {
 
     fn record<'a>(&mut self, fields: impl IntoIterator<Item = &'a str>) -> Result<(), LogError> {
         let written = self.file.write_record(fields).map_err(io::Error::from).and_then(|()| self.file.flush());
+        let written = written.and_then(|()| self.disk.written());
         Ok(written.map_err(|source| FileError::unwritten(&self.path, source))?)
     }
 }
@@ -207,8 +248,10 @@ pub fn parse(path: &Path, text: Vec<u8>) -> Result<Vec<Entry>, FileError> {
 #[derive(Default)]
 pub struct Pieces {
     path: PathBuf,
-    /// The header, and below it the wanted lines of a piece.
+    /// The lines down to the header, and below it the wanted lines of a piece.
     table: String,
+    /// Lines down to the header; 0 before it was read.
+    head: usize,
     /// The number of each of these lines in the log.
     numbers: Vec<u64>,
     /// The beginning of an incomplete line.
@@ -229,11 +272,11 @@ impl Pieces {
     /// # Errors
     /// As [`read`], except for a log without lines.
     pub fn take(&mut self, bytes: &[u8], is_wanted: impl FnMut(&str) -> bool) -> Result<Vec<Entry>, FileError> {
-        let (whole, rest) = bytes.split_at(end(bytes));
+        let (whole, rest) = bytes.split_at(end(bytes, b"\n"));
         self.cut.extend_from_slice(whole);
         let mut text = if whole.is_empty() { Vec::new() } else { std::mem::take(&mut self.cut) };
         // The last line is complete only when the next one shows that no quotation mark is open.
-        let last = end(&text[..text.len().saturating_sub(1)]);
+        let last = end(&text[..text.len().saturating_sub(1)], b"\n");
         if text[last..].iter().filter(|&&byte| byte == b'"').count() % 2 == 1 {
             self.cut = text.split_off(last);
         }
@@ -260,18 +303,21 @@ impl Pieces {
         for line in text.split_inclusive('\n') {
             self.lines += 1;
             let is_text = line != "\n" && !line.starts_with('#');
-            if is_text && (self.numbers.is_empty() || is_wanted(line)) {
+            if is_text && (self.head == 0 || is_wanted(line)) {
                 self.table.push_str(line);
                 self.numbers.push(self.lines);
+                if self.head == 0 && !is_above_header(line) {
+                    self.head = self.numbers.len();
+                }
             }
         }
-        if self.numbers.len() < 2 {
+        if self.numbers.len() == self.head || self.head == 0 {
             return Ok(Vec::new());
         }
         self.has_entries = true;
         let entries = self.parse();
-        self.table.truncate(self.table.find('\n').map_or(0, |end| end + 1));
-        self.numbers.truncate(1);
+        self.table.truncate(self.table.split_inclusive('\n').take(self.head).map(str::len).sum());
+        self.numbers.truncate(self.head);
         entries
     }
 
@@ -296,14 +342,44 @@ mod tests {
         let file = tempfile::NamedTempFile::new().unwrap();
         let path = file.path();
         let answer = "speed_mm_s,spacing_mm \"quoted\"";
-        LogWriter::open(path).unwrap().write(0, &Happening::Answer(answer.to_owned())).unwrap();
-        let mut cut = fs::read(path).unwrap();
-        cut.extend(b"17,sta");
-        fs::write(path, cut).unwrap();
-        LogWriter::open(path).unwrap().write(0, &Happening::Lost("no\nport".to_owned())).unwrap();
-        let entries: Vec<(u64, Kind, String)> =
-            read(path).unwrap().into_iter().map(|entry| (entry.number, entry.kind, entry.text)).collect();
-        assert_eq!(entries, [(2, Kind::Answer, answer.to_owned()), (3, Kind::Lost, r"no\nport".to_owned())]);
+        for end in ["\n", "\r\n", "\r"] {
+            fs::write(path, "").unwrap();
+            LogWriter::open(path).unwrap().write(0, &Happening::Answer(answer.to_owned())).unwrap();
+            let cut = fs::read_to_string(path).unwrap().replace('\n', end) + "17,sta";
+            fs::write(path, cut).unwrap();
+            let mut log = LogWriter::open(path).unwrap();
+            log.write(0, &Happening::Lost("no\nport".to_owned())).unwrap();
+            assert_eq!(log.lines(), 2, "{end:?}");
+            let entries: Vec<(u64, Kind, String)> =
+                read(path).unwrap().into_iter().map(|entry| (entry.number, entry.kind, entry.text)).collect();
+            assert_eq!(entries, [(2, Kind::Answer, answer.to_owned()), (3, Kind::Lost, r"no\nport".to_owned())]);
+        }
+    }
+
+    #[test]
+    fn a_log_has_one_writer_and_any_readers() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let mut log = LogWriter::open(file.path()).unwrap();
+        assert!(matches!(LogWriter::open(file.path()), Err(LogError::Shared(_))));
+        log.write(0, &Happening::Lost("no port".to_owned())).unwrap();
+        assert_eq!(read(file.path()).unwrap().len(), 1);
+        drop(log);
+        assert_eq!(LogWriter::open(file.path()).unwrap().lines(), 1);
+    }
+
+    #[test]
+    fn a_log_that_the_disk_does_not_take_is_an_error() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let mut log = LogWriter::open(file.path()).unwrap();
+        log.disk = Disk::new(|| Err(io::Error::other("the card is out"))).unwrap();
+        let lost = Happening::Lost("no port".to_owned());
+        let error = (0..1000).find_map(|_| {
+            std::thread::sleep(std::time::Duration::from_millis(10));
+            log.write(0, &lost).err()
+        });
+        let Some(LogError::File(error)) = error else { panic!("{error:?}") };
+        assert_eq!(std::error::Error::source(&error).unwrap().to_string(), "the card is out");
+        assert!(log.write(0, &lost).is_err());
     }
 
     #[test]
@@ -318,7 +394,8 @@ mod tests {
     #[test]
     fn a_log_in_pieces_is_that_log_and_its_errors_are_in_the_same_lines() {
         let whole = "# monday\n\nkind,time_ms,line\n# early\nlost,0,\"a, b\"\n\nstatus,1,x\nstatus,2,y\nevent,3,z";
-        for text in [whole.to_owned(), whole.replace('\n', "\r\n"), whole.replace('\n', "\r")] {
+        let declared = format!("\u{feff}sep=;\n;;\n\"# a; note\";;\n{}", whole.replace(',', ";"));
+        for text in [whole.to_owned(), whole.replace('\n', "\r\n"), whole.replace('\n', "\r"), declared] {
             for text in [text.clone(), format!("{text}\n"), text.replace("lost", "gossip"), text.replace("y", "\"y")] {
                 let as_one = parse(Path::new("log"), text.clone().into_bytes()).map_err(|error| error.to_string());
                 for length in [1, 2, 7, 40, 1000] {
