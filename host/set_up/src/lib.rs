@@ -29,6 +29,7 @@ pub use self::steps::{ManualStep, Task, steps};
 
 use self::leads::{Timing, extremes, leads, travel_ms};
 
+use control::say::command::{Action, Command};
 use control::settings::{Setting, Settings};
 use link::EventLine;
 use link::session::Happening;
@@ -142,9 +143,14 @@ impl SetUp {
     }
 
     fn take_command(&mut self, line: &str) {
-        let words: Vec<&str> = line.split_whitespace().collect();
-        self.measures_the_wheel = matches!(words[..], ["calibrate", length, ..] if length.parse::<u16>().is_ok());
-        self.sets_margin |= matches!(words[..], ["set", "margin_mm", _]);
+        self.measures_the_wheel = false;
+        match link::command(line) {
+            Ok(Command { action: Action::Calibrate, .. }) => self.measures_the_wheel = true,
+            Ok(Command { action: Action::Set, setting: Setting::MarginMm, .. }) => self.sets_margin = true,
+            // The measurements begin again.
+            Ok(Command { action: Action::Set, setting: Setting::TicksPerM, number: 0, .. }) => self.ticks_per_m.clear(),
+            _ => {}
+        }
     }
 
     fn take_answer(&mut self, line: &str) {
@@ -208,7 +214,7 @@ impl SetUp {
     /// The parts of the margin.
     ///
     /// # Errors
-    /// The missing steps, if not everything was measured.
+    /// The missing steps, if not everything was measured. [`Step::MeasureAgain`], if no margin covers the measurements.
     pub fn margin(&self, settings: &Settings) -> Result<Margin, Vec<Step>> {
         let missing = self.missing(settings);
         if !missing.is_empty() {
@@ -237,14 +243,29 @@ impl SetUp {
             let rolled_mm = circle::rolled_mm(top_mm_s, travel_ms(&timings), zone_mm, circle::aside_mm(pulse_us));
             circle::carried_by_stroke_mm(pulse_us, tool_mm.into(), zone_mm, rolled_mm)
         });
-        Ok(Margin {
+        let margin = Margin {
             slip_mm,
             servo_mm: f64::from(scatter_ms) * speed_m_s,
             firmware_mm: FIRMWARE_MM * speed_m_s / SPEED_M_S,
             stems_mm: keeps_stems(settings).then_some(STEM_SHARE * zone_mm),
             arm_mm,
             in_use_mm: settings.get(Setting::MarginMm),
-        })
+        };
+        let least_mm = margin.least_mm();
+        if Setting::MarginMm.allows(least_mm) {
+            return Ok(margin);
+        }
+        Err(vec![Step::MeasureAgain(
+            least_mm,
+            match margin {
+                Margin { servo_mm, .. } if servo_mm > slip_mm.max(arm_mm) => {
+                    "see to the servo, its times differ too much"
+                }
+                _ if arm_mm > slip_mm => "shorten the trailing arm's stroke",
+                _ if second_beam_mm > 0.0 => "roll past more plants",
+                _ => "`set ticks_per_m 0`, and measure the wheel again",
+            },
+        )])
     }
 
     /// Why the tasks of a step are not done with these settings. `None` if they are, or if no setting and no
@@ -293,10 +314,13 @@ impl SetUp {
         match self.margin(settings) {
             Ok(margin) => (in_use_mm < margin.least_mm())
                 .then(|| format!("margin_mm {in_use_mm} is too small: the measurements need {}", margin.least_mm())),
-            Err(missing) => (in_use_mm < safe_mm).then(|| {
-                let missing: Vec<&str> = missing.iter().map(Step::name).collect();
-                format!("margin_mm {in_use_mm} is not measured: {} first; {safe_mm} is safe", missing.join(" and "))
-            }),
+            Err(missing) => match &missing[..] {
+                [again @ Step::MeasureAgain(..)] => Some(format!("margin_mm {in_use_mm} is too small: {again}")),
+                _ => (in_use_mm < safe_mm).then(|| {
+                    let missing: Vec<&str> = missing.iter().map(Step::name).collect();
+                    format!("margin_mm {in_use_mm} is not measured: {} first; {safe_mm} is safe", missing.join(" and "))
+                }),
+            },
         }
     }
 }
@@ -307,170 +331,4 @@ fn keeps_stems(settings: &Settings) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use rig::settings;
-
-    fn heard(lines: &[&[&str]]) -> SetUp {
-        SetUp::of_lines(lines.concat())
-    }
-
-    const TIMED: &[&str] =
-        &["calibrated lead_out_ms=150 lead_in_ms=52 set=yes", "calibrated lead_out_ms=158 lead_in_ms=56 set=yes"];
-
-    const BY_EYE: &str = "calibrated by=eye, set lead_out_ms and lead_in_ms to what you saw";
-
-    /// Two measurements of the wheel.
-    const MEASURED: &[&str] = &[
-        "> calibrate 10000",
-        "ticks_per_m=1910 from 0 to 20000, default 0, not saved",
-        "> get ticks_per_m",
-        "ticks_per_m=1700 from 0 to 20000, default 0, not saved",
-        "> calibrate 10000 force",
-        "ticks_per_m=1930 from 0 to 20000, default 0, not saved",
-        "ok",
-    ];
-
-    /// A third one.
-    const THIRD: &[&str] = &["> calibrate 10000", "ticks_per_m=1920 from 0 to 20000, default 0, not saved"];
-
-    /// The worst leads of those that were timed, with a value for another setting.
-    fn worst_leads(other: Setting, value: u16) -> Vec<(Setting, u16)> {
-        vec![(Setting::LeadOutMs, 158), (Setting::LeadInMs, 52), (other, value)]
-    }
-
-    #[test]
-    fn a_machine_without_measurements_is_left_alone() {
-        assert_eq!(heard(&[&["> get", MEASURED[1], "slip permille=12"]]).next(&Settings::new()), None);
-    }
-
-    #[test]
-    fn servo_wheel_and_margin_come_one_after_the_other() {
-        let next = |lines: &[&[&str]], changes: &[_]| heard(lines).next(&settings(changes)).expect("there is a step");
-        let leads = |out_ms| [(Setting::LeadOutMs, out_ms), (Setting::LeadInMs, 56)];
-        assert_eq!(next(&[&TIMED[..1]], &leads(150)), Step::TimeServo(1));
-        assert_eq!(next(&[TIMED], &leads(150)), Step::SetLead(Setting::LeadOutMs, 158));
-        assert_eq!(next(&[TIMED], &leads(158)), Step::SetLead(Setting::LeadInMs, 52));
-        let mut changes = worst_leads(Setting::TicksPerM, 0);
-        assert_eq!(next(&[TIMED], &changes), Step::MeasureWheel(0));
-        changes[2].1 = 1920;
-        assert_eq!(next(&[TIMED, MEASURED], &changes), Step::MeasureWheel(2));
-        // 10 of 1920 ticks and 3 % over 400 mm, 15 ms at 0.694 m/s, and the firmware's 5 mm.
-        let step = next(&[TIMED, MEASURED, THIRD], &changes);
-        let Step::SetMargin(margin) = step else { panic!("{step:?}") };
-        assert!((margin.slip_mm - 400.0 * (10.0 / 1920.0 + 0.03)).abs() < 1e-9);
-        assert!((margin.servo_mm - 15.0 * SPEED_M_S).abs() < 1e-9);
-        for (in_use_mm, told) in [
-            (50, "lower the margin: `set margin_mm 30`: slip 14 + servo 10 + 5 mm at 2.5 km/h"),
-            (30, "the margin pays for slip 14 + servo 10 + 5 mm at 2.5 km/h: `save`"),
-            (29, "raise the margin: `set margin_mm 30`: slip 14 + servo 10 + 5 mm at 2.5 km/h"),
-        ] {
-            let changes = [&changes[..], &[(Setting::MarginMm, in_use_mm)]].concat();
-            assert_eq!(next(&[TIMED, MEASURED, THIRD], &changes).to_string(), told);
-        }
-    }
-
-    #[test]
-    fn with_a_second_beam_plants_show_the_remaining_slip() {
-        let mut changes = worst_leads(Setting::SecondBeamMm, 200);
-        assert_eq!(
-            heard(&[TIMED, MEASURED, MEASURED]).missing(&settings(&changes)),
-            [Step::MeasureWheel(0), Step::PassPlants(0)],
-            "the wheel as it is set was not measured"
-        );
-        changes.push((Setting::TicksPerM, 1930));
-        let few = heard(&[TIMED, MEASURED, MEASURED, &["slip permille=40"; 5]]);
-        assert_eq!(few.next(&settings(&changes)), Some(Step::PassPlants(5)));
-        // Old values do not count.
-        let plants = ["slip permille=50", "slip permille=90"].repeat(PLANTS / 2);
-        let enough = heard(&[TIMED, MEASURED, MEASURED, &["slip permille=40"; 5], &plants]);
-        let margin = enough.margin(&settings(&changes)).expect("all was measured");
-        assert!((margin.slip_mm - 8.0).abs() < 1e-9, "a twenty-fifth of 200 mm: {margin:?}");
-    }
-
-    #[test]
-    fn beside_a_stem_s_zone_leads_and_margin_go_up_to_its_circle() {
-        let set_up = heard(&[TIMED, MEASURED, THIRD, &["slip permille=12"; PLANTS]]);
-        // 3 % of 200 mm, 15 ms at 2.5 km/h and the firmware's 5 mm: 21.4.
-        // Beside a zone of 100 mm, 6, 4.2, 8.8 and 2 mm. A trailing arm with a tool of 130 mm needs some millimetres more,
-        // and around canopies the 102.5 mm by which 45 degrees carry it.
-        let trailing = SetUp { trailing_tool_mm: Some(130), ..set_up.clone() };
-        for (set_up, zone_mm, least_mm, leads) in [
-            (&set_up, 0, 22, (158, 52)),
-            (&set_up, 100, 21, (127, 72)),
-            (&trailing, 100, 32, (127, 72)),
-            (&trailing, 0, 124, (158, 52)),
-        ] {
-            let mut changes = worst_leads(Setting::TicksPerM, 1930);
-            (changes[0].1, changes[1].1) = leads;
-            changes.extend([(Setting::SecondBeamMm, 200), (Setting::StemZoneMm, zone_mm)]);
-            let margin = set_up.margin(&settings(&changes)).expect("all was measured");
-            assert_eq!(margin.least_mm(), least_mm, "{margin:?}");
-        }
-    }
-
-    #[test]
-    fn a_servo_that_was_timed_by_eye_scatters_by_the_error_of_the_eye() {
-        let failed = "calibrated by=none, the end switch did not follow";
-        let set_up = heard(&[&[BY_EYE, failed, BY_EYE], MEASURED, MEASURED]);
-        let margin = set_up.margin(&settings(&[(Setting::TicksPerM, 1930)])).expect("all was measured");
-        assert!((margin.servo_mm - f64::from(SERVO_MS) * SPEED_M_S).abs() < 1e-9);
-    }
-
-    #[test]
-    fn a_servo_that_was_timed_over_another_stroke_is_to_be_timed_again() {
-        let set_up = heard(&[&["servo_out_us=1795"], TIMED, MEASURED, MEASURED]);
-        for (out_us, missing) in [(1795, vec![]), (1800, vec![Step::TimeServo(0)]), (1700, vec![Step::TimeServo(0)])] {
-            let changes = [worst_leads(Setting::TicksPerM, 1930), vec![(Setting::ServoOutUs, out_us)]].concat();
-            assert_eq!(set_up.missing(&settings(&changes)), missing, "{out_us}");
-        }
-    }
-
-    #[test]
-    fn a_margin_below_the_measured_one_gives_a_warning() {
-        let typed = &["> set margin_mm 13"][..];
-        let all = heard(&[TIMED, MEASURED, THIRD, typed]);
-        let (in_part, nothing) = (heard(&[TIMED, typed]), heard(&[typed]));
-        // A machine that was set up earlier gets no warning.
-        let earlier = heard(&[&["> get"]]);
-        let (servo, wheel) = ("time the servo and ", "measure the wheel first; 50 is safe");
-        for (set_up, margin_mm, warning) in [
-            (&all, 30, None),
-            (&all, 29, Some("margin_mm 29 is too small: the measurements need 30".to_owned())),
-            (&in_part, 50, None),
-            (&in_part, 49, Some(format!("margin_mm 49 is not measured: {wheel}"))),
-            (&nothing, 13, Some(format!("margin_mm 13 is not measured: {servo}{wheel}"))),
-            (&earlier, 13, None),
-        ] {
-            let changes = [worst_leads(Setting::TicksPerM, 1920), vec![(Setting::MarginMm, margin_mm)]].concat();
-            assert_eq!(set_up.warning(&settings(&changes)), warning);
-        }
-    }
-
-    #[test]
-    fn measurements_are_the_same_after_writing_and_reading() {
-        let set_up = heard(&[&["servo_out_us=1795"], TIMED, MEASURED, &[BY_EYE, "slip permille=-4"]]);
-        let settings = settings(&[(Setting::ServoOutUs, 1795)]);
-        let lines = set_up.lines();
-        let again = SetUp::of_lines(lines.iter().map(String::as_str));
-        assert_eq!((again.lines(), again.missing(&settings)), (lines, set_up.missing(&settings)));
-        assert_eq!(again.missing(&settings), [Step::MeasureWheel(0)]);
-    }
-
-    #[test]
-    fn every_step_fits_on_a_line_of_80_characters() {
-        let mm = 123.0;
-        let margin =
-            Margin { slip_mm: mm, servo_mm: mm, firmware_mm: mm, stems_mm: Some(mm), arm_mm: 0.0, in_use_mm: 50 };
-        for step in [
-            Step::TimeServo(1),
-            Step::SetLead(Setting::LeadOutMs, 158),
-            Step::MeasureWheel(2),
-            Step::PassPlants(11),
-            Step::SetMargin(margin),
-            Step::Ready(margin),
-        ] {
-            assert!(step.to_string().len() <= 80, "{} in {step}", step.to_string().len());
-        }
-    }
-}
+mod tests;

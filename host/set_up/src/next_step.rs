@@ -17,6 +17,8 @@ pub enum Step {
     PassPlants(usize),
     /// The margin can, or must, be changed to this one.
     SetMargin(Margin),
+    /// No margin is as great as this one, in millimetres, which the measurements need; what to do.
+    MeasureAgain(u16, &'static str),
     /// The margin is right.
     Ready(Margin),
 }
@@ -29,6 +31,7 @@ impl Step {
             Self::SetLead(..) => "set the lead",
             Self::MeasureWheel(_) => "measure the wheel",
             Self::PassPlants(_) => "pass some plants",
+            Self::MeasureAgain(..) => "measure again",
             Self::SetMargin(_) | Self::Ready(_) => "set the margin",
         }
     }
@@ -50,6 +53,7 @@ impl fmt::Display for Step {
                 let word = if margin.least_mm() < margin.in_use_mm { "lower" } else { "raise" };
                 write!(f, "{word} the margin: `set margin_mm {}`: {margin}", margin.least_mm())
             }
+            Self::MeasureAgain(least_mm, how) => write!(f, "the measurements need {least_mm} mm: {how}"),
             Self::Ready(margin) => write!(f, "the margin pays for {margin}: `save`"),
         }
     }
