@@ -217,7 +217,8 @@ type Difference = (String, Value, Value, String);
 
 fn differences(wanted: &Named, found: &Shown) -> Result<Vec<Difference>, SettingsError> {
     let mut differences = Vec::new();
-    for &(setting, file) in &wanted.settings {
+    let replaced = wanted.foreign.iter().filter_map(|foreign| found.replacement(foreign));
+    for (setting, file) in wanted.settings.iter().copied().chain(replaced) {
         let own = found.others.iter().find(|other| other.name == name(setting)).map(|other| Value::from(other.value));
         let machine = match found.missing.contains(&setting) {
             true => own.unwrap_or(Value::Null),
@@ -225,7 +226,7 @@ fn differences(wanted: &Named, found: &Shown) -> Result<Vec<Difference>, Setting
         };
         differences.push((name(setting), value(setting.is_switched(), file), machine, unit(setting)));
     }
-    for foreign in &wanted.foreign {
+    for foreign in wanted.foreign.iter().filter(|foreign| found.replacement(foreign).is_none()) {
         let own = found.takes(foreign)?;
         let value = |number| value(own.is_switched, number);
         differences.push((own.name.clone(), value(foreign.value), value(own.value), own.unit.clone()));

@@ -107,7 +107,8 @@ pub fn push(link: &mut Link, wanted: &[Taught], replace: bool) -> Result<Pushed,
     let stale: Vec<u16> =
         before.iter().filter(|(_, example)| replace && !named.contains(example)).map(|&(number, _)| number).collect();
     let new: Vec<&Taught> = wanted.iter().filter(|&&example| known.insert(example)).collect();
-    let free = usize::from(CAPACITY) - (before.len() - stale.len());
+    // A newer firmware may have room for more.
+    let free = usize::from(CAPACITY).saturating_sub(before.len() - stale.len());
     if new.len() > free {
         return Err(ExamplesError::NoRoom { new: new.len(), free });
     }

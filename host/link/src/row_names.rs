@@ -185,13 +185,22 @@ pub fn wrong_with(name: &str) -> Option<String> {
     if length == 0 || length > NAME_LENGTH {
         return Some(format!("it has to have 1 to {NAME_LENGTH} characters"));
     }
-    if name.trim() != name || name.starts_with('.') {
+    if name.trim() != name || name.starts_with('.') || name.ends_with('.') {
         return Some("it has to begin and end with neither a blank nor a dot".to_owned());
     }
     if name.chars().any(|character| character.is_control() || r#"/\:*?"<>|="#.contains(character)) {
         return Some(
             r#"it becomes a file's name, and may have no control character and none of / \ : * ? " < > | ="#.into(),
         );
+    }
+    let begin = name.split('.').next().unwrap_or_default().trim_end().to_ascii_lowercase();
+    let number = begin.strip_prefix("com").or(begin.strip_prefix("lpt"));
+    let is_numbered =
+        number.is_some_and(|number| number.chars().count() == 1 && "123456789\u{b9}\u{b2}\u{b3}".contains(number));
+    if is_numbered || ["con", "nul", "aux", "prn"].contains(&&*begin) {
+        return Some(format!(
+            "it becomes a file's name, and Windows keeps {begin} for a device: add a word, as in row-{begin}"
+        ));
     }
     (name == ALL).then(|| format!("`{ALL}` means every row"))
 }
@@ -407,6 +416,9 @@ mod tests {
             ("1: x", "none of /"),
             (".hidden", "neither a blank nor a dot"),
             (" 1", "neither a blank nor a dot"),
+            ("row.", "neither a blank nor a dot"),
+            ("Con", "Windows keeps con for a device"),
+            ("com1.left", "Windows keeps com1 for a device: add a word, as in row-com1"),
             ("all", "`all` means every row"),
             ("left", "there is a row Left already"),
         ] {

@@ -152,6 +152,11 @@ impl Shown {
         let is_it = |own: &&OtherSetting| own.name == foreign.name && own.range.contains(&foreign.value);
         self.others.iter().find(is_it).ok_or_else(|| SettingsError::NotKnown(foreign.problem.clone()))
     }
+
+    /// The setting that replaced this one, with its value, if the machine has it.
+    pub fn replacement(&self, foreign: &Foreign) -> Option<(Setting, u16)> {
+        foreign.replaced_by.filter(|(setting, _)| !self.missing.contains(setting))
+    }
 }
 
 const OWN: &str = env!("CARGO_PKG_VERSION");
@@ -254,6 +259,8 @@ pub struct Foreign {
     pub value: u16,
     /// What would be right for this program, with the file's line.
     pub problem: String,
+    /// This program's setting that replaced it, with the converted value.
+    pub replaced_by: Option<(Setting, u16)>,
 }
 
 /// Sets some settings, leaves the others unchanged, and reads all back. `save` saves them. Returns the changed settings.
@@ -276,7 +283,7 @@ pub fn push(
     for &(setting, value) in wanted {
         let name = name(setting);
         if shown.missing.contains(&setting) {
-            foreign.push(Foreign { problem: format!("{name} {value} is wanted"), name, value });
+            foreign.push(Foreign { problem: format!("{name} {value} is wanted"), name, value, replaced_by: None });
         } else {
             // Values of settings are in their ranges.
             let _ = after.set(setting, value);
@@ -284,6 +291,10 @@ pub fn push(
     }
     let mut changed = Vec::new();
     for foreign in &foreign {
+        if let Some((setting, value)) = shown.replacement(foreign) {
+            let _ = after.set(setting, value);
+            continue;
+        }
         let own = shown.takes(foreign)?;
         if own.value != foreign.value {
             let value = match foreign.value {

@@ -61,8 +61,11 @@ fn parse(path: &Path, text: &str) -> Result<(DocumentMut, Named), FileError> {
         let wrong = |problem| FileError::at_key(path, text, key, problem);
         let number = item.as_integer().and_then(|number| u16::try_from(number).ok());
         if key == OLD_MERGE_GAP {
-            let right = || wrong(format!("{key} has to be a whole number, 0 to 2000; now it is merge_gap_mm, in mm"));
-            old_merge_gap = Some(number.filter(|&ticks| ticks <= 2000).ok_or_else(right)?);
+            let problem = wrong(format!("{key} has to be a whole number, 0 to 2000; now it is merge_gap_mm, in mm"));
+            match number.filter(|&ticks| ticks <= 2000) {
+                Some(ticks) => old_merge_gap = Some((ticks, problem.to_string())),
+                None => return Err(problem),
+            }
             continue;
         }
         let (known, is_switch) = (Setting::find(key.as_bytes()), item.is_bool());
@@ -87,12 +90,17 @@ fn parse(path: &Path, text: &str) -> Result<(DocumentMut, Named), FileError> {
         // Another version may have the setting, or a wider range.
         let is_possible = known.is_none_or(|setting| !setting.is_switched() && !is_switch);
         match value.filter(|_| is_possible) {
-            Some(value) => foreign.push(Foreign { name: key.to_owned(), value, problem: problem.to_string() }),
+            Some(value) => {
+                foreign.push(Foreign { name: key.to_owned(), value, problem: problem.to_string(), replaced_by: None });
+            }
             None => return Err(problem),
         }
     }
-    if let Some(ticks) = old_merge_gap.filter(|_| settings.iter().all(|&(setting, _)| setting != Setting::MergeGapMm)) {
-        settings.push((Setting::MergeGapMm, merge_gap_mm(ticks, &settings)));
+    if let Some((value, problem)) = old_merge_gap
+        && settings.iter().all(|&(setting, _)| setting != Setting::MergeGapMm)
+    {
+        let replaced_by = Some((Setting::MergeGapMm, merge_gap_mm(value, &settings)));
+        foreign.push(Foreign { name: OLD_MERGE_GAP.to_owned(), value, problem, replaced_by });
     }
     Ok((document, Named { settings, foreign }))
 }
@@ -242,7 +250,12 @@ mod tests {
 
     #[test]
     fn a_merge_gap_in_ticks_is_read_in_millimetres_of_the_files_own_wheel() {
-        let gap = |text| parsed(text).unwrap().into_iter().find(|(setting, _)| *setting == Setting::MergeGapMm);
+        let named = |text| parse(Path::new("machine.toml"), text).unwrap().1;
+        let gap = |text| {
+            let Named { settings, foreign } = named(text);
+            let replaced = foreign.iter().filter_map(|foreign| Shown::default().replacement(foreign));
+            settings.into_iter().chain(replaced).find(|(setting, _)| *setting == Setting::MergeGapMm)
+        };
         assert_eq!(gap("merge_gap_ticks = 40"), Some((Setting::MergeGapMm, 21)));
         assert_eq!(gap("merge_gap_ticks = 40\nticks_per_m = 1000"), Some((Setting::MergeGapMm, 40)));
         assert_eq!(gap("merge_gap_ticks = 2000\nticks_per_m = 500"), Some((Setting::MergeGapMm, 1000)));
@@ -262,6 +275,9 @@ mod tests {
         let new = updated(Path::new("machine.toml"), old, &of_its_version).unwrap();
         assert!(new.starts_with("# ragged leaves\nmerge_gap_ticks = 40 # three were too few\n"), "{new}");
         assert_eq!(gap(&new), Some((Setting::MergeGapMm, 21)));
+        let foreign = &named(&new).foreign[0];
+        assert_eq!(of_its_version.takes(foreign).unwrap().value, 40);
+        assert_eq!(of_its_version.replacement(foreign), None);
     }
 
     #[test]

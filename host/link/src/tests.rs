@@ -19,7 +19,7 @@ fn over(resets: bool, mut answer: impl FnMut(&str) -> Vec<u8> + 'static) -> Resu
 }
 
 /// A link to a firmware that answers `version` correctly, and everything else by `answer`.
-fn link(answer: impl Fn(&str) -> Vec<u8> + 'static) -> Link {
+fn link(mut answer: impl FnMut(&str) -> Vec<u8> + 'static) -> Link {
     let answer = move |line: &str| match line {
         "" => Vec::new(),
         "version" => VERSION.to_vec(),
@@ -176,4 +176,44 @@ fn a_machine_at_work_is_not_taught_and_forgets_nothing() {
     link.ask("start").expect("it goes to work");
     assert_matches!(examples::push(&mut link, &[other], true), Err(ExamplesError::AtWork));
     assert_eq!(examples::read(&mut link).expect("it lists them"), [(0, one)]);
+}
+
+#[test]
+fn a_machine_that_has_more_examples_than_this_program_allows_has_no_room() {
+    let [known, wanted] =
+        [24, 20].map(|width| examples::example_of(&Features::describe(278, 250, width), label::PLANT));
+    let known = format!("field 0 plant {}\r\n", known.features.map(|feature| feature.to_string()).join(" "));
+    let mut machine = machine();
+    let mut link = link(move |line| {
+        let more = if line == "examples" { known.repeat(40) } else { String::new() };
+        [more.as_bytes(), &machine(line)].concat()
+    });
+    assert_matches!(examples::push(&mut link, &[wanted], false), Err(ExamplesError::NoRoom { new: 1, free: 0 }));
+}
+
+#[test]
+fn a_merge_gap_in_ticks_is_pushed_to_machines_of_its_version_and_of_this_one() {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    for (is_old, ticks, changed) in
+        [(true, 40, None), (true, 41, Some("merge_gap_ticks")), (false, 40, None), (false, 60, Some("merge_gap_mm"))]
+    {
+        std::fs::write(file.path(), format!("merge_gap_ticks = {ticks}\n")).unwrap();
+        let named = settings_file::read(file.path()).unwrap();
+        let mut machine = machine();
+        let mut link = link(move |line| {
+            let own =
+                if is_old { line.replace("set merge_gap_ticks 41", "set merge_gap_mm 22") } else { line.to_owned() };
+            let answer = String::from_utf8(machine(&own)).unwrap();
+            let lines = answer.lines().map(|line| match line.strip_prefix("merge_gap_mm=") {
+                Some(rest) if is_old => {
+                    let ticks = if rest.starts_with("22") { 41 } else { 40 };
+                    format!("merge_gap_ticks={ticks} ticks from 0 to 2000, default 40\r\n")
+                }
+                _ => format!("{line}\r\n"),
+            });
+            lines.collect::<String>().into_bytes()
+        });
+        let pushed = settings::push(&mut link, &named.settings, &named.foreign, false).unwrap();
+        assert_eq!(pushed, changed.into_iter().collect::<Vec<_>>(), "{is_old} {ticks}");
+    }
 }
