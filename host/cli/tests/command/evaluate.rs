@@ -32,7 +32,7 @@ fn the_manual_s_example_is_evaluated_in_plain_words_and_tables() {
     let said = said(Path::new("."), &["evaluate", EXAMPLE]);
     for line in [
         "24 plots of 8 treatments (1, 1.5, 2 and 2.5 km/h; 50 and 60 cm), 3 of each treatment.",
-        "13 of 1318 plants were damaged: 0.99 %, two-sided 95 % interval 0.53 to 1.68 %. At most 4.00 % in each of these plots",
+        "13 of 1318 plants were damaged: 0.99 %, two-sided 95 % interval 0.52 to 1.69 %. At most 4.00 % in each of these plots",
         "the odds that a plant is damaged are 4.49 times as high for each km/h more (1.17 to 17.24; p = 0.0306)",
         "Performance index scatters more at some speeds or spacings than at others (p = 0.0192)",
         "Plant damage rises by 1.292 points for each km/h (p = 0.0119) and shows no effect of spacing (p = 0.5347)",

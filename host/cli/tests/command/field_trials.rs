@@ -207,7 +207,7 @@ fn an_error_in_a_sweep_is_named_and_nothing_is_written() {
         &["sweep", "--x", "lead=1..2:1", "--out", "s.csv"],
         "lead is neither a parameter of the field nor",
     );
-    assert_writes_nothing(&["sweep", "--x", "speed=1..2:0", "--out", "s.csv"], "in steps above 0");
+    assert_writes_nothing(&["sweep", "--x", "speed=1..2:0", "--out", "s.csv"], "in steps of 0.001 or more");
     assert_writes_nothing(&["sweep", "--x", "k=1..3:1", "--result", "money"], "plant_damage");
     assert_writes_nothing(
         &["sweep", "--x", "speed=1..2:1", "--y", "speed=2..3:1", "--out", "s.csv"],

@@ -42,7 +42,7 @@ fn examples_written_as_csv_are_known_to_the_firmware() {
     let folder = TempDir::new().unwrap();
     said(folder.path(), &["train", "--synthetic", "--out", "examples.csv"]);
     let said = said(folder.path(), &["classify", "examples.csv"]);
-    assert!(said.contains("Treated as they should   100.00 % of all"), "{said}");
+    assert!(said.contains("Treated as they should       100.00 % of all"), "{said}");
 }
 
 #[test]
@@ -90,7 +90,8 @@ fn objects_that_take_more_examples_than_the_flash_has_room_for_are_refused_by_na
     let square = |place: i32| {
         let (spacing_mm, hold_mm) = (100 + place / 20 * 50, 100 + place % 20 * 10);
         let label = if (place / 20 + place) % 2 == 0 { "plant" } else { "weed" };
-        format!("694,{spacing_mm},226,{hold_mm},500,{label}\n").repeat(4)
+        let line = |aside_mm: i32| format!("694,{},226,{hold_mm},500,{label}\n", spacing_mm + aside_mm);
+        (0..4).map(line).collect::<String>()
     };
     let chessboard: String = (0..400).map(square).collect();
     for most in ["64".to_owned(), MOST_EXAMPLES.to_string()] {
@@ -102,6 +103,30 @@ fn objects_that_take_more_examples_than_the_flash_has_room_for_are_refused_by_na
         );
         assert_not_taken(&chessboard, &["train", "objects.csv", "--max", &most], &room);
     }
+}
+
+#[test]
+fn detections_that_dumps_repeat_count_once() {
+    // Four plants and four weeds, saved by dumps that overlap: each is there three times.
+    let detection = |number: i32| match number % 2 {
+        0 => format!("694,{},226,{},500,plant\n", 400 + number, 250 - number),
+        _ => format!("694,{},226,{},500,weed\n", 200 + number, 110 + number),
+    };
+    let dump = |from: i32| (from..from + 6).map(|number| detection(number % 8)).collect::<String>();
+    let folder = folder_with(&[dump(0), dump(2), dump(4), dump(6)].concat());
+    let output = weeder(folder.path(), &["train", "objects.csv"]);
+    let [said, told] = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text).into_owned());
+    assert!(said.starts_with("Detections  8\n"), "{said}");
+    assert!(told.contains("Passed over 16 that repeat another line"), "{told}");
+}
+
+#[test]
+fn a_class_that_no_detection_has_gets_no_share() {
+    let folder = folder_with("694,300,226,116,439,weed\n");
+    let output = weeder(folder.path(), &["classify", "objects.csv"]);
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(said.contains("Plants classified as weeds   0 of 0, \u{2013}"), "{said}");
+    assert!(said.contains("Weeds left standing          0 of 1, 0.00 %"), "{said}");
 }
 
 #[test]

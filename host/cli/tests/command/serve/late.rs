@@ -126,23 +126,26 @@ fn a_sleep_of_the_computer_is_no_silence_of_the_machine() {
 }
 
 #[test]
-fn a_start_through_a_port_that_stalls_may_be_done_but_not_after_it_is_given_up() {
+fn a_start_through_a_port_that_stalls_is_done_only_if_the_answer_says_so() {
     let folder = folder();
     let (uno, port) = uno(&folder, "uno", &["--stand", "--no-reset"]);
     let served = serve(&folder, &[&port], &["--allow-start"]);
     served.make_ready(0);
     let mut events = Events::open(&served.here, "", 0);
     signal(&uno, "-STOP");
-    // The machine's silence ends it, or the server's loss of the machine before.
+    // Mostly a poll is typed meanwhile. The command then waits behind it.
+    thread::sleep(Duration::from_millis(300));
     let (status, said) = served.command(&served.here, "", "start");
     assert!(matches!(status, 503 | 504), "{status} {said}");
-    assert!(status == 503 || said.contains("may still do it"), "{status} {said}");
+    // Typed before the poll, it is still in the port, which a pseudo terminal does not empty.
+    let may_be_done = said.contains("may still do it");
+    assert_eq!(status == 504, may_be_done, "{status} {said}");
     signal(&uno, "-CONT");
     events.wait_for(|message| {
-        assert!(!has(message, "said", "work"), "{message}");
+        assert!(may_be_done || !has(message, "said", "work"), "{message}");
         message["is"] == "there"
     });
-    assert_eq!(state(&served.here, ""), "state=hold");
+    assert!(may_be_done || state(&served.here, "") == "state=hold");
 }
 
 /// Runs `ip`. Returns whether it has succeeded, and why not.
