@@ -39,7 +39,7 @@ pub struct OddsTerm {
     pub statistic: f64,
     /// The two-sided p-value of the statistic, 0 to 1.
     pub p: f64,
-    /// The factor of the odds for each unit.
+    /// The factor of the odds for each unit, at most [`f64::MAX`].
     pub odds_ratio: f64,
     /// The ends of its two-sided 95 % interval.
     pub odds_interval: (f64, f64),
@@ -77,12 +77,12 @@ impl BinomialModel {
     /// If there are more or fewer counts than plots.
     pub fn fit(design: &Design, counts: &[(u32, u32)]) -> Result<Self, NoModel> {
         assert_eq!(counts.len(), design.plots(), "a response has a count for each plot");
+        let (columns, mut remarks) = design.columns()?;
         let counts: Vec<Count> = counts.iter().map(|&(count, of)| (count.into(), of.into())).collect();
         let (all, of) = counts.iter().fold((0.0, 0.0), |(all, of), (count, n)| (all + count, of + n));
         if all == 0.0 || all == of {
             return Err(NoModel::Constant { value: if all == 0.0 { 0.0 } else { 100.0 } });
         }
-        let (columns, mut remarks) = design.columns()?;
         let (solution, fitted) = fit(&columns, &counts)?;
         let share = all / of;
         let degrees_of_freedom = counts.len() - columns.len();
@@ -99,7 +99,7 @@ impl BinomialModel {
         let term = |(index, (name, _)): (usize, &Column)| {
             let (estimate, standard_error) = (solution.coefficients[index], factor * solution.variances[index].sqrt());
             let statistic = estimate / standard_error;
-            let odds = |errors: f64| (estimate + errors * standard_error).exp();
+            let odds = |errors: f64| (estimate + errors * standard_error).exp().min(f64::MAX);
             OddsTerm {
                 name,
                 estimate,

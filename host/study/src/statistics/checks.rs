@@ -106,21 +106,24 @@ fn unequal_scatter(design: &Design, model: &LinearModel) -> Option<f64> {
 }
 
 fn farthest(design: &Design, model: &LinearModel) -> Option<(Vec<usize>, f64)> {
-    /// Differences of t below this share are rounding.
-    const TIE: f64 = 1e-9;
+    /// Parts and differences below this share are rounding.
+    const ROUNDING: f64 = 1e-9;
     let (columns, _) = design.columns().ok()?;
     let basis = basis(&columns).ok()?;
     let freedom = model.degrees_of_freedom.checked_sub(1).filter(|freedom| *freedom > 0)? as f64;
     let residual: f64 = model.residuals.iter().map(|residual| residual * residual).sum();
     let of_plots = model.residuals.iter().enumerate().filter_map(|(plot, deviation)| {
-        let leverage = basis.leverage(plot);
-        let without = (residual - deviation * deviation / (1.0 - leverage)) / freedom;
-        let t = deviation / (without * (1.0 - leverage)).sqrt();
-        t.is_finite().then_some((plot, t.abs()))
+        let own = 1.0 - basis.leverage(plot);
+        let without = residual - deviation * deviation / own;
+        // The others fit exactly: this plot alone scatters.
+        let is_alone = without <= ROUNDING * residual;
+        let t = if is_alone { f64::INFINITY } else { deviation.abs() / (without / freedom * own).sqrt() };
+        // A plot that its model follows in any case has no deviation.
+        (own > ROUNDING).then_some((plot, t))
     });
     let of_plots: Vec<(usize, f64)> = of_plots.collect();
     let t = of_plots.iter().map(|(_, t)| *t).max_by(f64::total_cmp)?;
-    let plots = of_plots.iter().filter(|(_, other)| *other >= t * (1.0 - TIE)).map(|(plot, _)| *plot).collect();
+    let plots = of_plots.iter().filter(|(_, other)| *other >= t * (1.0 - ROUNDING)).map(|(plot, _)| *plot).collect();
     let alone = 2.0 * StudentsT::new(0.0, 1.0, freedom).ok()?.sf(t);
     Some((plots, (alone * design.plots() as f64).min(1.0)))
 }

@@ -23,10 +23,14 @@ impl Design {
     }
 
     /// The speed in km/h, the spacing in cm, the nominal speed in km/h and the block of each plot. Models keep the
-    /// measured speeds. The analysis of variance compares the nominal ones, and what differs from block to block is no
-    /// chance to it.
+    /// measured speeds, if there is more than one nominal speed. The analysis of variance compares the nominal ones, and
+    /// what differs from block to block is no chance to it.
     pub fn in_blocks(plots: impl IntoIterator<Item = (f64, f64, f64, u32)>) -> Self {
-        let (speeds_km_h, spacings_cm, levels_km_h, blocks) = plots.into_iter().collect();
+        let (mut speeds_km_h, spacings_cm, levels_km_h, blocks): (Vec<f64>, _, Vec<f64>, _) =
+            plots.into_iter().collect();
+        if !varies(&levels_km_h) {
+            speeds_km_h.clone_from(&levels_km_h);
+        }
         Self { speeds_km_h, spacings_cm, levels_km_h, blocks }
     }
 
@@ -128,19 +132,22 @@ pub enum Remark {
     /// Spacing is no term.
     #[error("all plots have the same spacing, so that it is left out")]
     OneSpacing,
-    /// The interaction would use up all plots.
-    #[error(
-        "no treatment was repeated, so the interaction cannot be separated from chance: it is part of the residual"
-    )]
+    /// The interaction would leave too few plots for the scatter.
+    #[error("too few treatments were repeated to separate the interaction from chance: it is part of the residual")]
     NoReplication,
-    /// The treatments differ in their number of plots.
+    /// The treatments differ in their number of plots, in the trial or in a block.
     #[error(
-        "the treatments differ in their number of plots: sums of squares are sequential (type I), speed first, then spacing, then both"
+        "the treatments differ in their number of plots, in the trial or in a block: sums of squares are sequential (type I), speed first, then spacing, then both"
     )]
     Unbalanced,
     /// Too few plots for blocks.
     #[error("the replications are not used as blocks: too few plots would remain to separate effects from chance")]
     NoBlocks,
+    /// Speed or spacing goes with the blocks.
+    #[error(
+        "the replications are not used as blocks: their effects cannot be separated from those of speed and spacing"
+    )]
+    InseparableBlocks,
     /// Plots differ by more than the scatter of counting.
     #[error(
         "plots differ by more than counting explains: standard errors of the binomial model are multiplied by {factor:.2}, and t has the residual degrees of freedom (quasi-binomial)"

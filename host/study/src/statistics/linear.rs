@@ -51,11 +51,11 @@ impl LinearModel {
     /// If there are more or fewer values than plots.
     pub fn fit(design: &Design, values: &[f64]) -> Result<Self, NoModel> {
         assert_eq!(values.len(), design.plots(), "a response has a value for each plot");
+        let (columns, mut remarks) = design.columns()?;
         let total = scatter(values);
         if is_zero(total, values) {
             return Err(NoModel::Constant { value: mean(values) });
         }
-        let (columns, mut remarks) = design.columns()?;
         let basis = basis(&columns)?;
         let Solution { coefficients, variances } = basis.solve(values).ok_or(NoModel::Inseparable)?;
         let residuals = basis.residual(values);

@@ -56,62 +56,73 @@ impl AnalysisOfVariance {
     /// If there are more or fewer values than plots.
     pub fn of(design: &Design, values: &[f64]) -> Result<Self, NoModel> {
         assert_eq!(values.len(), design.plots(), "a response has a value for each plot");
-        if is_zero(scatter(values), values) {
-            return Err(NoModel::Constant { value: mean(values) });
-        }
         let (speeds, spacings) = (levels(&design.levels_km_h), levels(&design.spacings_cm));
         let (treatments, blocks) = (levels(design.treatments()), levels(&design.blocks));
         let (has_speed, has_spacing) = (speeds.len() > 1, spacings.len() > 1);
-
-        let mut remarks = Vec::new();
-        let mut in_blocks: Vec<&Levels> = Vec::new();
-        if blocks.len() > 1 {
-            if additive_fit(&[&blocks, &treatments], values)?.parameters + SPARE <= values.len() {
-                in_blocks.push(&blocks);
-            } else {
-                remarks.push(Remark::NoBlocks);
-            }
-        }
-        let fit = |levels: &[&Levels]| additive_fit(&[in_blocks.as_slice(), levels].concat(), values);
-
-        let mut fits = vec![("", Fit { parameters: 1, sum_of_squares: scatter(values) })];
-        if !in_blocks.is_empty() {
-            fits.push(("block", fit(&[])?));
-        }
-        let before = fits.len();
-        if has_speed {
-            fits.push(("speed", fit(&[&speeds])?));
-        } else {
-            remarks.push(Remark::OneSpeed);
-        }
-        if has_spacing {
-            fits.push(("spacing", fit(&[&speeds, &spacings])?));
-        } else {
-            remarks.push(Remark::OneSpacing);
-        }
-        if fits.len() == before {
+        let factors = [(has_speed, Remark::OneSpeed), (has_spacing, Remark::OneSpacing)];
+        let mut remarks: Vec<Remark> =
+            factors.into_iter().filter(|(varies, _)| !varies).map(|(_, remark)| remark).collect();
+        if !has_speed && !has_spacing {
             return Err(NoModel::OneTreatment);
         }
-        if has_speed && has_spacing {
-            let (by_speed, both) = (fits[before].1.parameters, fits[before + 1].1.parameters);
-            if both == by_speed || both == fit(&[&spacings])?.parameters {
+
+        let nested = |in_blocks: &[&Levels]| {
+            let fit = |levels: &[&Levels]| additive_fit(&[in_blocks, levels].concat(), values);
+            let mut fits = vec![("", Fit { parameters: 1, sum_of_squares: scatter(values) })];
+            if !in_blocks.is_empty() {
+                fits.push(("block", fit(&[])?));
+            }
+            if has_speed {
+                fits.push(("speed", fit(&[&speeds])?));
+            }
+            let mut is_separable = true;
+            if has_spacing {
+                let both = fit(&[&speeds, &spacings])?;
+                is_separable = !has_speed || both.parameters > fit(&[&spacings])?.parameters;
+                fits.push(("spacing", both));
+            }
+            if !is_separable || fits.windows(2).any(|pair| pair[1].1.parameters == pair[0].1.parameters) {
                 return Err(NoModel::Inseparable);
             }
             let each = fit(&[&treatments])?;
-            if each.parameters == values.len() {
-                remarks.push(Remark::NoReplication);
-            } else if each.parameters > both {
+            if each.parameters > fits[fits.len() - 1].1.parameters {
                 fits.push(("speed x spacing", each));
             }
-            let is_complete = treatments.len() == speeds.len() * spacings.len();
-            if !is_complete || treatments.iter().any(|plots| plots.len() != treatments[0].len()) {
+            Ok(fits)
+        };
+        let has_spare = |fits: &[(&str, Fit)]| fits[fits.len() - 1].1.parameters + SPARE <= values.len();
+        let has_blocks = blocks.len() > 1;
+        let in_blocks: &[&Levels] = if has_blocks { &[&blocks] } else { &[] };
+        let mut fits = match nested(in_blocks) {
+            Ok(fits) if has_blocks && !has_spare(&fits) => {
+                remarks.push(Remark::NoBlocks);
+                nested(&[])?
+            }
+            Err(NoModel::Inseparable) if has_blocks => {
+                remarks.push(Remark::InseparableBlocks);
+                nested(&[])?
+            }
+            fits => fits?,
+        };
+        if !has_spare(&fits) && fits.pop_if(|(name, _)| *name == "speed x spacing").is_some() {
+            remarks.push(Remark::NoReplication);
+        }
+        if has_speed && has_spacing {
+            let is_in_blocks = fits[1].0 == "block";
+            let cells = (0..values.len()).map(|plot| if is_in_blocks { design.blocks[plot] } else { 0 });
+            let cells = levels(design.treatments().zip(cells));
+            let all = speeds.len() * spacings.len() * if is_in_blocks { blocks.len() } else { 1 };
+            if cells.len() != all || cells.iter().any(|plots| plots.len() != cells[0].len()) {
                 remarks.push(Remark::Unbalanced);
             }
         }
         let (_, last) = fits[fits.len() - 1];
-        if last.parameters + SPARE > values.len() {
+        if !has_spare(&fits) {
             let needed = last.parameters + SPARE;
             return Err(NoModel::TooFewPlots { plots: values.len(), parameters: last.parameters, needed });
+        }
+        if is_zero(scatter(values), values) {
+            return Err(NoModel::Constant { value: mean(values) });
         }
 
         let residual_freedom = values.len() - last.parameters;
