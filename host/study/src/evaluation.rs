@@ -22,7 +22,7 @@ use self::published::Published;
 use crate::statistics::{
     AnalysisOfVariance, BinomialModel, Checks, Design, LinearModel, Mean, NoModel, Share, grouped,
 };
-use anyhow::{Result, anyhow, ensure};
+use anyhow::{Result, anyhow, bail, ensure};
 use serde::Serialize;
 
 /// The analysis of all plots of a trial.
@@ -80,7 +80,7 @@ impl Analysis {
     /// Analyses the plots of a trial.
     ///
     /// # Errors
-    /// If there is no plot, or an invalid one. A measure without a model has a [`NoModel`] instead.
+    /// If there is no plot, an invalid one, or a replication of a treatment twice. A measure without a model has a [`NoModel`] instead.
     pub fn of(records: Vec<PlotRecord>) -> Result<Self> {
         Self::at_speeds(records, &[])
     }
@@ -111,6 +111,14 @@ impl Analysis {
         ensure!(!records.is_empty(), "a trial has at least one plot");
         for record in &records {
             record.check().map_err(|problem| anyhow!("plot {}: {problem}", record.plot))?;
+        }
+        let replications = records.iter().zip(&levels_km_h).map(|(of, level)| (of.replication, *level, of.spacing_cm));
+        for ((replication, speed, spacing), plots) in grouped(replications.zip(records.iter().map(|of| of.plot))) {
+            if let [first, second, ..] = plots.as_slice() {
+                bail!(
+                    "plots {first} and {second} are both replication {replication} of {speed} km/h and {spacing} cm: each plot needs its own replication"
+                );
+            }
         }
         let responses = Response::ALL.map(|response| ResponseAnalysis::of(response, &records, &levels_km_h)).to_vec();
         Ok(Self { records, levels_km_h, responses })

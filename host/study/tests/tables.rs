@@ -6,7 +6,7 @@ use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use std::path::{Path, PathBuf};
 use study::evaluation::{Analysis, PlotRecord, read_csv};
-use study::statistics::{BinomialModel, NoModel};
+use study::statistics::{BinomialModel, NoModel, Remark};
 
 fn table(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/tables").join(name)
@@ -125,6 +125,70 @@ fn speeds_as_measured_have_no_analysis_of_variance_but_an_offer_that_works() {
     // A trial that repeats no treatment has set speeds, so nothing is offered.
     let once: Vec<PlotRecord> = example().into_iter().filter(|plot| plot.replication == 1).collect();
     assert!(!Analysis::of(once).unwrap().findings().iter().any(|finding| finding.contains("--speeds")));
+}
+
+/// `ols('y ~ spacing')`, and `GLM` with the dispersion, as above.
+#[test]
+fn plots_measured_at_one_nominal_speed_have_no_slope_by_speed() {
+    let plots = plots("one-speed-as-measured.csv");
+    let analysis = Analysis::at_speeds(plots.clone(), &[2.0]).unwrap();
+    let weeding = analysis.responses[1].model.as_ref().unwrap();
+    assert_eq!(weeding.remarks, [Remark::OneSpeed]);
+    for (term, (name, estimate, error)) in
+        weeding.terms.iter().zip([("constant", 87.0, 19.18088240931579), ("spacing", -0.025, 0.347311099736245)])
+    {
+        assert_eq!(term.name, name);
+        assert_close(term.estimate, estimate);
+        assert_close(term.standard_error, error);
+    }
+    let damage = odds(&analysis, 0);
+    assert_close(damage.dispersion, 2.4775919732441394);
+    assert_close(damage.terms[1].estimate, -0.05280674302004962);
+    assert_close(damage.terms[1].standard_error, 0.11679480568628686);
+    // Without the nominal speed, the odds for each km/h have a hundred digits.
+    let analysis = Analysis::of(plots).unwrap();
+    assert!(odds(&analysis, 0).terms.iter().all(|term| term.odds_interval.1.is_finite()));
+    let text = analysis.to_string();
+    assert!(text.contains("> 1000000 (") && !text.contains(&"0".repeat(20)), "{text}");
+}
+
+#[test]
+fn one_plot_says_nothing_about_speed_and_spacing() {
+    let analysis = Analysis::of(example()[..1].to_vec()).unwrap();
+    assert_eq!(analysis.records[0].damaged, Some(0));
+    for of in &analysis.responses {
+        assert_eq!(of.model.as_ref().err(), Some(&NoModel::OneTreatment));
+        assert_eq!(of.variance.as_ref().err(), Some(&NoModel::OneTreatment));
+        assert!(of.binomial.as_ref().is_none_or(|model| *model == Err(NoModel::OneTreatment)));
+    }
+}
+
+#[test]
+fn a_replication_occurs_once_at_a_nominal_speed() {
+    let plot = |(replication, speed_km_h)| PlotRecord { plot: 0, replication, speed_km_h, ..example()[0] };
+    let plots: Vec<PlotRecord> = [(1, 1.02), (2, 1.01), (1, 2.02), (1, 0.99)].map(plot).into_iter().collect();
+    assert!(Analysis::of(plots.clone()).is_ok());
+    let error = Analysis::at_speeds(plots, &[1.0, 2.0]).unwrap_err().to_string();
+    let expected = "plots 1 and 4 are both replication 1 of 1 km/h and 50 cm: each plot needs its own replication";
+    assert_eq!(error, expected);
+}
+
+/// `100 * scipy.stats.beta.ppf([0.025, 0.975], [1, 2], [1206, 1205])`.
+#[test]
+fn the_damage_of_a_treatment_is_of_all_its_plants_and_in_its_interval() {
+    let plot = |(replication, plants, damaged)| PlotRecord {
+        replication,
+        plants: Some(plants),
+        damaged: Some(damaged),
+        ..example()[0]
+    };
+    let analysis = Analysis::of([(1, 6, 1), (2, 600, 0), (3, 600, 0)].map(plot).to_vec()).unwrap();
+    let damaged = analysis.treatments()[0].damaged;
+    assert_eq!((damaged.count, damaged.of), (1, 1206));
+    assert_close(damaged.least_percent, 0.0020992986927988416);
+    assert_close(damaged.greatest_percent, 0.4611189473301202);
+    let text = analysis.to_string();
+    assert!(text.contains(&format!(" {} ({damaged})", damaged.shown())), "{text}");
 }
 
 /// `ols('y ~ speed + spacing')` with `y = 100 * (1 - after / before)`: one is -15 %.

@@ -14,8 +14,9 @@ p is how probable it is that chance alone makes an effect as large: below 0.05 i
 Capacities are by Eq. 25 and 26 of the paper, field efficiency by Eq. 24. The performance index (Eq. 27) is
 effective capacity in ha/h, times the percentages of plants unharmed and of weeds gone, by the power in hp.
 Weeding efficiency is of the weeds that were counted: over a whole plot it is higher than in the row alone.
-Behind damage stands its exact 95 % interval over all plants of the treatment: two-sided where it has two ends, one-sided
-where it reads below or above. It takes plants as independent: where plots scatter by more than counting, it is too narrow.
+A treatment's damage is of all its plants together. Behind it stands its exact 95 % interval: two-sided where it has two
+ends, one-sided where it reads below or above. It takes plants as independent: where plots scatter by more than counting,
+it is too narrow.
 Behind weeding stands the two-sided 95 % interval of a mean of plots.
 ";
 
@@ -77,11 +78,13 @@ fn measures(of: &Performance) -> [String; MEASURES.len()] {
 impl Analysis {
     /// The means by treatment.
     pub(crate) fn means(&self) -> Table {
-        let columns = ["treatment", "plots"].into_iter().chain(MEASURES.map(|(heading, ..)| heading));
+        let [_, others @ ..] = MEASURES.map(|(heading, ..)| heading);
+        let columns = ["treatment", "plots", "plant damage of all plants, %"].into_iter().chain(others);
         let mut table = Table::new("Means of the plots of each treatment", columns);
         for treatment in self.treatments() {
             let name = format!("{} km/h, {} cm", short(treatment.speed_km_h), short(treatment.spacing_cm));
-            let [damage, weeding, others @ ..] = measures(&treatment.mean);
+            let [_, weeding, others @ ..] = measures(&treatment.mean);
+            let damage = optional(treatment.mean.plant_damage_percent, |_| treatment.damaged.shown());
             let damage = format!("{damage} ({})", treatment.damaged);
             let weeding = treatment
                 .weeding_efficiency
@@ -192,9 +195,9 @@ impl BinomialModel {
                 name => (name, None),
             };
             let times = decimals.map_or(NOTHING.to_owned(), |decimals| {
-                let fixed = |odds| fixed(odds, decimals);
+                let said = |odds| times(odds, decimals);
                 let (least, greatest) = term.odds_interval;
-                format!("{} ({} to {})", fixed(term.odds_ratio), fixed(least), fixed(greatest))
+                format!("{} ({} to {})", said(term.odds_ratio), said(least), said(greatest))
             });
             table.rows.push(vec![
                 name.to_owned(),
@@ -226,6 +229,12 @@ impl AnalysisOfVariance {
         }
         table
     }
+}
+
+/// A factor of the odds. A close pair of speeds can give one of hundreds of digits.
+pub(super) fn times(odds: f64, decimals: usize) -> String {
+    const MOST: f64 = 1e6;
+    if odds > MOST { format!("> {MOST}") } else { fixed(odds, decimals) }
 }
 
 /// Words with a capital letter in front and a full stop behind.
