@@ -32,6 +32,9 @@ const LOOK: Duration = Duration::from_millis(20);
 /// Time without a line of an awaited answer after which a `hold` goes first.
 const STALLED: Duration = Duration::from_millis(500);
 
+/// Longest wait for the two statuses after the last answer. Another version's status may not be known.
+const LONGEST_REPORT: Duration = Duration::from_secs(2);
+
 /// Goes on until the input has ended and its last command has been answered; bad where one was refused. `are_there`
 /// says which rows were there when they were opened. Fails if a line was not sent, an Uno goes away with commands
 /// unanswered, or output or log fail.
@@ -113,7 +116,8 @@ impl<'a> Talk<'a> {
             }
             let ended = has_all && self.waiting.is_empty();
             // Two statuses after a command, all its events have come.
-            let has_reported = |row: &Standing| !row.is_there || row.statuses >= 2;
+            let is_late = self.moved_at.elapsed() > LONGEST_REPORT;
+            let has_reported = |row: &Standing| !row.is_there || row.statuses >= 2 || is_late;
             if ended && self.is_idle() && self.standing.iter().all(has_reported) {
                 return self.end();
             }
@@ -263,7 +267,66 @@ mod tests {
     use link::row_names::{Board, Row};
     use link::{LinkError, Wire};
     use rig::ScriptedBoard;
-    use std::sync::mpsc;
+    use std::io::Read;
+    use std::sync::atomic::{AtomicBool, Ordering};
+    use std::sync::{Arc, mpsc};
+    use std::thread;
+
+    /// A board whose status has a word that this program does not know, while the flag is set.
+    struct Newer<P>(P, Arc<AtomicBool>);
+
+    impl<P: Read> Read for Newer<P> {
+        fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+            let count = self.0.read(buffer)?;
+            if self.1.load(Ordering::Relaxed) {
+                let text = String::from_utf8_lossy(&buffer[..count]).replace("state=hold", "state=park");
+                buffer[..count].copy_from_slice(text.as_bytes());
+            }
+            Ok(count)
+        }
+    }
+
+    impl<P: Write> Write for Newer<P> {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.0.write(bytes)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            self.0.flush()
+        }
+    }
+
+    /// The only row, whose port is at this board.
+    fn only_row(open: Opener) -> (Rows, Chosen) {
+        let (rows, missing) = Rows::open(vec![open]);
+        assert!(missing[0].is_none());
+        let row = Row { name: "Uno".to_owned(), board: Board::Only { beside: None } };
+        (rows, Chosen { rows: vec![row], are_several: false })
+    }
+
+    #[test]
+    fn a_session_ends_without_a_status_that_it_knows() {
+        let (ended, end) = mpsc::channel();
+        thread::spawn(move || {
+            let port = ScriptedBoard::plugged_in();
+            let is_parked = Arc::new(AtomicBool::new(false));
+            let flag = Arc::clone(&is_parked);
+            let (rows, chosen) = only_row(Box::new(move || {
+                let port = port.open().ok_or(LinkError::Absent("it".to_owned()))?;
+                Ok(Wire::over(Newer(port, Arc::clone(&flag)), false))
+            }));
+            is_parked.store(true, Ordering::Relaxed);
+            let (sender, commands) = mpsc::sync_channel(1);
+            sender.send(Line { number: 1, text: "status".to_owned() }).unwrap();
+            drop(sender);
+            let mut output = Vec::new();
+            let finding = Talk::new(&rows, &[true], &chosen, None).run(&commands, &mut output).unwrap();
+            ended.send((finding, String::from_utf8(output).unwrap())).unwrap();
+        });
+        let (finding, output) = end.recv_timeout(Duration::from_secs(30)).expect("it ends");
+        assert_eq!(finding, Finding::Good);
+        assert!(output.contains("state=park"), "{output}");
+    }
 
     #[test]
     fn a_hold_goes_before_an_answer_that_does_not_come() {
@@ -271,10 +334,7 @@ mod tests {
         let port = board.clone();
         let open: Opener =
             Box::new(move || Ok(Wire::over(port.open().ok_or(LinkError::Absent("it".to_owned()))?, false)));
-        let (rows, missing) = Rows::open(vec![open]);
-        assert!(missing[0].is_none());
-        let row = Row { name: "Uno".to_owned(), board: Board::Only { beside: None } };
-        let chosen = Chosen { rows: vec![row], are_several: false };
+        let (rows, chosen) = only_row(open);
         let (sender, commands) = mpsc::sync_channel(9);
         for (number, text) in (1..).zip(["clear", "silence", "clear", "Hold!"]) {
             sender.send(Line { number, text: text.to_owned() }).unwrap();
