@@ -334,8 +334,8 @@ impl Guide {
             }
         };
         let torque = Design::of(&machine)?.servo_torque;
-        let swing = match Swing::of(&machine, torque) {
-            Ok(swing) => swing.fitted(&settings::read(&mut self.link)?),
+        let swing = match Swing::fitted(&machine, torque, &settings::read(&mut self.link)?) {
+            Ok(swing) => swing,
             Err(problem) => {
                 tell!("  The tool cannot swing as it has to: {problem}.");
                 return Ok(Vec::new());

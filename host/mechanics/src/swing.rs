@@ -12,7 +12,7 @@
 
 use crate::machine::{Machine, SwingInputs};
 use crate::unit::{KG_CM, MM};
-use link::settings::{Setting, Settings};
+use link::settings::{Setting, Settings, name};
 use serde::Serialize;
 use set_up::{circle, saved_ms};
 use uom::si::f64::{Time, Torque};
@@ -59,13 +59,27 @@ impl Swing {
     /// The swing of a machine, whose servo turns against this torque.
     ///
     /// # Errors
-    /// If the arm is too short or the servo too weak, in words.
+    /// If the arm is too short, or the servo too weak or too slow, in words.
     pub fn of(machine: &Machine, torque: Torque) -> Result<Self, String> {
-        Self::with_tool(machine, torque, MM.value(machine.intra_row.width))
+        Self::with_tool(machine, torque, MM.value(machine.intra_row.width), machine.swing.pulse_in, true)
     }
 
-    /// The same with a tool of another width, mm.
-    fn with_tool(machine: &Machine, torque: Torque, tool_mm: f64) -> Result<Self, String> {
+    /// The same from where a board's tool was fitted in the row, and to the same side. Settings with the default pulses
+    /// tell neither.
+    ///
+    /// # Errors
+    /// As [`of`](Self::of).
+    pub fn fitted(machine: &Machine, torque: Torque, settings: &Settings) -> Result<Self, String> {
+        let pulses = [Setting::ServoInUs, Setting::ServoOutUs];
+        if pulses.iter().all(|&pulse| settings.get(pulse) == pulse.description().default) {
+            return Self::of(machine, torque);
+        }
+        let [in_us, out_us] = pulses.map(|pulse| f64::from(settings.get(pulse)));
+        Self::with_tool(machine, torque, MM.value(machine.intra_row.width), in_us, in_us <= out_us)
+    }
+
+    /// The same with a tool of another width in mm, from this pulse in us, and with longer or shorter pulses.
+    fn with_tool(machine: &Machine, torque: Torque, tool_mm: f64, in_us: f64, is_longer: bool) -> Result<Self, String> {
         let inputs = machine.swing;
         let arm_mm = MM.value(machine.intra_row.shank_length);
         let aside_mm = kept_mm(machine) / 2.0 + MM.value(inputs.room) + tool_mm / 2.0;
@@ -104,36 +118,39 @@ impl Swing {
             carried_mm = circle::carried_mm(arm_mm, tool_mm, stem_zone_mm, rolled_mm);
         }
         let [saved_out_ms, saved_in_ms] = saved;
+        let in_us = in_us.round();
+        let out_us = if is_longer { in_us + stroke_us } else { in_us - stroke_us };
+        let lead_out_ms = (lead_out_ms - saved_out_ms).ceil().max(0.0);
+        let lead_in_ms = (dead_ms(inputs.least_dead_time.min(inputs.most_dead_time)) + saved_in_ms).floor();
+        for (setting, value, advice) in [
+            (Setting::ServoOutUs, out_us, "take a longer arm, or fit the tool at another servo_in_us"),
+            (Setting::LeadOutMs, lead_out_ms, "take a faster or a stronger one"),
+            (Setting::LeadInMs, lead_in_ms, "take one with a shorter dead time"),
+        ] {
+            let (name, range) = (name(setting), setting.description());
+            let (least, greatest) = (range.least, range.greatest);
+            if !(f64::from(least)..=f64::from(greatest)).contains(&value) {
+                return Err(format!(
+                    "the servo needs {name} {value}, and the firmware takes {least} to {greatest}: {advice}"
+                ));
+            }
+        }
         let (arm_margin_mm, lift_mm) = if inputs.arm_trails > 0 { (carried_mm, 0.0) } else { (0.0, stroke_mm) };
         Ok(Self {
             stem_zone_mm: stem_zone_mm.ceil() as u32,
             angle_degrees,
-            servo_in_us: inputs.pulse_in.round() as u32,
-            servo_out_us: (inputs.pulse_in + stroke_us).round() as u32,
+            servo_in_us: in_us as u32,
+            servo_out_us: out_us as u32,
             load,
             unloaded_ms,
             loaded_ms,
-            lead_out_ms: (lead_out_ms - saved_out_ms).ceil() as u32,
-            lead_in_ms: (dead_ms(inputs.least_dead_time.min(inputs.most_dead_time)) + saved_in_ms).floor() as u32,
+            lead_out_ms: lead_out_ms as u32,
+            lead_in_ms: lead_in_ms as u32,
             arm_margin_mm: arm_margin_mm.ceil() as u32,
             lift_mm,
             unweeded_strip_mm: (from_mm - tool_mm / 2.0).max(0.0),
             filling_tool_mm: 2.0 * from_mm,
         })
-    }
-
-    /// The same stroke from where the tool was fitted in the row, and to the same side. Settings with the default pulses
-    /// tell neither.
-    #[must_use]
-    pub fn fitted(mut self, settings: &Settings) -> Self {
-        let pulses = [Setting::ServoInUs, Setting::ServoOutUs];
-        if pulses.iter().any(|&pulse| settings.get(pulse) != pulse.description().default) {
-            let stroke_us = self.servo_out_us - self.servo_in_us;
-            let [in_us, out_us] = pulses.map(|pulse| u32::from(settings.get(pulse)));
-            self.servo_in_us = in_us;
-            self.servo_out_us = if out_us < in_us { in_us.saturating_sub(stroke_us) } else { in_us + stroke_us };
-        }
-        self
     }
 
     /// The settings that follow.
@@ -186,7 +203,8 @@ impl Swing {
             said.push("Tool and sweeps leave no strip between them.".to_owned());
             return said;
         }
-        let wider = Self::with_tool(machine, torque, self.filling_tool_mm);
+        let (in_us, is_longer) = (f64::from(self.servo_in_us), self.servo_in_us <= self.servo_out_us);
+        let wider = Self::with_tool(machine, torque, self.filling_tool_mm, in_us, is_longer);
         said.push(format!(
             "Between tool and sweeps {:.1} mm on either side of the row are not weeded: a tool of {:.0} mm would fill that{}.",
             self.unweeded_strip_mm,
@@ -210,15 +228,30 @@ fn kept_mm(machine: &Machine) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::unit::SECOND;
+
+    fn with_tool_of_100_mm() -> Machine {
+        let mut machine = Machine::default();
+        machine.intra_row.width = MM.of(100.0);
+        machine
+    }
+
+    /// A board whose tool was fitted with these pulses, in and out.
+    fn board([in_us, out_us]: [u16; 2]) -> Settings {
+        let mut settings = Settings::new();
+        settings.set(Setting::ServoInUs, in_us).expect("it is in its range");
+        settings.set(Setting::ServoOutUs, out_us).expect("it is in its range");
+        settings
+    }
 
     #[test]
     fn a_stem_s_zone_needs_a_shorter_stroke_than_its_canopy_and_comes_with_its_settings() {
         let torque = KG_CM.of(10.0);
-        let canopy = Swing::with_tool(&Machine::default(), torque, 100.0).expect("it swings");
+        let mut machine = with_tool_of_100_mm();
+        let canopy = Swing::of(&machine, torque).expect("it swings");
         assert_eq!((canopy.servo_out_us, canopy.set_lines().len()), (1795, 4));
-        let mut machine = Machine::default();
         machine.swing.protected = MM.of(90.0);
-        let stem = Swing::with_tool(&machine, torque, 100.0).expect("it swings");
+        let stem = Swing::of(&machine, torque).expect("it swings");
         // 45 + 10 + 50 mm of an arm of 350 are 17.5 degrees.
         let lines = ["set servo_out_us 1695", "set lead_out_ms 112", "set stem_zone_mm 100"];
         assert!(lines.iter().all(|line| stem.set_lines().iter().any(|set| set == line)), "{:?}", stem.set_lines());
@@ -230,18 +263,55 @@ mod tests {
 
     #[test]
     fn a_stroke_begins_where_the_tool_was_fitted_and_goes_to_the_same_side() {
-        let swing = Swing::with_tool(&Machine::default(), KG_CM.of(10.0), 100.0).expect("it swings");
-        for (fitted, pulses) in [
+        for (board_us, pulses) in [
             ([1500, 2000], [1500, 1795]),
             ([1620, 2000], [1620, 1915]),
             ([1480, 1000], [1480, 1185]),
             ([1500, 2100], [1500, 1795]),
         ] {
-            let mut settings = Settings::new();
-            settings.set(Setting::ServoInUs, fitted[0]).expect("it is in its range");
-            settings.set(Setting::ServoOutUs, fitted[1]).expect("it is in its range");
-            let fitted = swing.fitted(&settings);
+            let machine = with_tool_of_100_mm();
+            let fitted = Swing::fitted(&machine, KG_CM.of(10.0), &board(board_us)).expect("it swings");
             assert_eq!([fitted.servo_in_us, fitted.servo_out_us], pulses);
+            // A narrower tool offers the same stroke for the tool that fills the strip.
+            let machine = Machine::default();
+            let narrow = Swing::fitted(&machine, KG_CM.of(10.0), &board(board_us)).expect("it swings");
+            let sentences = narrow.sentences(&machine, KG_CM.of(10.0)).join(" ");
+            assert!(sentences.contains(&format!("`set servo_out_us {}`", pulses[1])), "{sentences}");
         }
+    }
+
+    #[test]
+    fn a_swing_whose_settings_the_firmware_refuses_says_what_to_change() {
+        let changed = |change: fn(&mut Machine)| {
+            let mut machine = with_tool_of_100_mm();
+            change(&mut machine);
+            machine
+        };
+        for (machine, pulses, problem) in [
+            (
+                changed(|machine| machine.swing.servo_time_60 = SECOND.of(1.5)),
+                [1500, 2000],
+                "the servo needs lead_out_ms 883, and the firmware takes 0 to 500: take a faster or a stronger one",
+            ),
+            (
+                changed(|machine| machine.swing.pulse_for_90 = 2500.0),
+                [1900, 2000],
+                "the servo needs servo_out_us 2635, and the firmware takes 500 to 2500: \
+                 take a longer arm, or fit the tool at another servo_in_us",
+            ),
+            (
+                with_tool_of_100_mm(),
+                [700, 600],
+                "the servo needs servo_out_us 405, and the firmware takes 500 to 2500: \
+                 take a longer arm, or fit the tool at another servo_in_us",
+            ),
+        ] {
+            let error = Swing::fitted(&machine, KG_CM.of(10.0), &board(pulses)).expect_err("it is refused");
+            assert_eq!(error, problem);
+        }
+        // The file's pulse goes out of the range, but the board's tool swings to the other side.
+        let machine = changed(|machine| machine.swing.pulse_in = 2300.0);
+        assert!(Swing::of(&machine, KG_CM.of(10.0)).is_err());
+        assert!(Swing::fitted(&machine, KG_CM.of(10.0), &board([2300, 1800])).is_ok());
     }
 }
