@@ -65,6 +65,9 @@ impl AnalysisOfVariance {
         if !has_speed && !has_spacing {
             return Err(NoModel::OneTreatment);
         }
+        if is_zero(scatter(values), values) {
+            return Err(NoModel::Constant { value: mean(values) });
+        }
 
         let nested = |in_blocks: &[&Levels]| {
             let fit = |levels: &[&Levels]| additive_fit(&[in_blocks, levels].concat(), values);
@@ -120,9 +123,6 @@ impl AnalysisOfVariance {
         if !has_spare(&fits) {
             let needed = last.parameters + SPARE;
             return Err(NoModel::TooFewPlots { plots: values.len(), parameters: last.parameters, needed });
-        }
-        if is_zero(scatter(values), values) {
-            return Err(NoModel::Constant { value: mean(values) });
         }
 
         let residual_freedom = values.len() - last.parameters;
