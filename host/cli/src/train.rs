@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use study::training::synthetic::{CROPS, Crop};
 use study::training::{
     self, Beside, Confusion, DEFAULT_MOST_EXAMPLES, Labelled, MOST_EXAMPLES, Training, listing, regions, synthetic,
-    table,
+    table::{self, ToLearn},
 };
 
 #[derive(Args)]
@@ -125,11 +125,14 @@ impl Arguments {
         if self.synthetic {
             return synthetic::objects(self.crop, self.seed);
         }
-        let (objects, unlabelled) = table::read_labelled(&self.files)?;
+        let ToLearn { labelled, unlabelled, repeated } = table::read_labelled(&self.files)?;
         if unlabelled > 0 {
             tell!("Passed over {unlabelled} without a label");
         }
-        Ok(objects)
+        if repeated > 0 {
+            tell!("Passed over {repeated} that repeat another line");
+        }
+        Ok(labelled)
     }
 
     /// The command that gives the same table again.

@@ -100,9 +100,8 @@ const ENEMY_DIVISOR: u32 = 4;
 ///   class. It is at most a quarter of the 1 % quantile of the distances to the nearest of the other class. Noise does
 ///   not count.
 /// - **k**, if none is given: each odd k is tried by leaving one detection out and classifying it by all others. The
-///   best k has the fewest plants classified as weeds, then the fewest weeds classified as plants, then the fewest
-///   unknown plants. Among equals the smallest from 3 on wins: with a k of 1 a single detection with a wrong label
-///   decides.
+///   best k has the fewest plants classified as weeds, then the fewest weeds left, then the fewest unknown plants. Among equals the smallest from 3 on wins: with a k of 1 a single detection with a wrong label
+///   decides. A k whose table cuts more plants than all detections together is passed over.
 /// - **Examples**: see [`condense`].
 ///
 /// # Errors
@@ -124,36 +123,34 @@ pub fn train(objects: &[Labelled], k: Option<u8>, most: usize) -> Result<Trainin
     let examples = quantised(&Scale::new(ranges), objects);
     let edited = condense::edit(&examples);
     let radius = learn_radius(&examples, &edited);
-    let left_out = |k| leave_one_out(&examples, objects, k, radius);
-    let (k, leave_one_out) = match k {
-        Some(k) => (k, left_out(k)),
-        // `min_by_key` keeps the first among equals.
-        None => (3..=MAX_K)
-            .step_by(2)
-            .chain([1])
-            .filter(|&k| usize::from(k) < objects.len())
-            .map(|k| (k, left_out(k)))
-            .min_by_key(|(_, confusion)| confusion.harm())
-            .context(NO_OBJECTS)?,
-    };
-    let kept = condense::condense(&examples, &edited, k, radius, most)?;
-    let mut training = Training {
-        ranges,
-        radius,
-        k,
-        edited_out: examples.len() - edited.len(),
-        kept: kept.into_iter().map(|index| objects[index]).collect(),
-        leave_one_out,
-        by_table: Confusion::default(),
-    };
-    training.by_table = training.model().classify(objects);
-    match training.by_table.plants_taken_for_weeds().saturating_sub(leave_one_out.plants_taken_for_weeds()) {
-        0 => Ok(training),
-        plants => bail!(
-            "with a vote of {k}, so few examples cut {} that all detections together spare: choose a smaller --k",
-            counted(plants, "plant")
-        ),
+    let votes = k.map_or_else(|| (3..=MAX_K).step_by(2).chain([1]).collect(), |k| vec![k]);
+    let votes = votes.into_iter().filter(|&k| usize::from(k) < objects.len());
+    let mut tried: Vec<(u8, Confusion)> = votes.map(|k| (k, leave_one_out(&examples, objects, k, radius))).collect();
+    // It keeps the order of equals.
+    tried.sort_by_key(|(_, leave_one_out)| leave_one_out.harm());
+    let mut refused = None;
+    for (k, leave_one_out) in tried {
+        let kept = condense::condense(&examples, &edited, k, radius, most)?;
+        let mut training = Training {
+            ranges,
+            radius,
+            k,
+            edited_out: examples.len() - edited.len(),
+            kept: kept.into_iter().map(|index| objects[index]).collect(),
+            leave_one_out,
+            by_table: Confusion::default(),
+        };
+        training.by_table = training.model().classify(objects);
+        match training.by_table.plants_taken_for_weeds().saturating_sub(leave_one_out.plants_taken_for_weeds()) {
+            0 => return Ok(training),
+            plants => refused = refused.or(Some((k, plants))),
+        }
     }
+    let (k, plants) = refused.context(NO_OBJECTS)?;
+    bail!(
+        "with a vote of {k}, so few examples cut {} that all detections together spare: choose a smaller --k, or label more",
+        counted(plants, "plant")
+    )
 }
 
 /// Examples to teach in the field, in addition to the built-in ones.

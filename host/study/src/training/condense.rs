@@ -1,7 +1,8 @@
 //! Reduces many detections to the few examples that decide alike.
 //!
 //! 1. **Wilson's editing** (D. L. Wilson, 1972): a detection whose three nearest others vote for the other class is
-//!    noise, or has the wrong label. It is removed.
+//!    noise, or has the wrong label. It is removed. If that were true of more than a tenth of the plants, they are not
+//!    noise, and all plants stay. So a few plants among many weeds stay plants.
 //! 2. **Hart's condensing** (P. E. Hart, 1968): while the chosen examples mistreat some detections, one of these is
 //!    added. A weed must be recognised within half the squared radius, so that slightly different weeds are recognised
 //!    later. A plant must not be classified as a weed. Hart adds such detections in their order. Here the next one is
@@ -33,13 +34,23 @@ fn check_room(needed: usize, most: usize) -> Result<()> {
 /// Neighbours that vote whether a detection is noise, as in Wilson's paper.
 const EDITORS: u8 = 3;
 
+/// At most one plant in so many can be noise.
+const PLANTS_FOR_NOISE: usize = 10;
+
 /// The indices of the examples that are not noise.
 pub fn edit(examples: &[Example<COUNT>]) -> Vec<usize> {
     let is_noise = |index: usize| {
         answer_of_others(examples, index, EDITORS, u32::MAX)
             .is_ok_and(|answer| answer.kind == Kind::Known && answer.label != examples[index].label)
     };
-    (0..examples.len()).filter(|&index| !is_noise(index)).collect()
+    let (noise, mut edited): (Vec<usize>, Vec<usize>) = (0..examples.len()).partition(|&index| is_noise(index));
+    let is_plant = |index: &usize| examples[*index].label == label::PLANT;
+    let noisy: Vec<usize> = noise.into_iter().filter(is_plant).collect();
+    if noisy.len() * PLANTS_FOR_NOISE > (0..examples.len()).filter(is_plant).count() {
+        edited.extend(noisy);
+        edited.sort_unstable();
+    }
+    edited
 }
 
 /// Chooses at most `most` of the `examples` with indices in `edited`, for a vote of `k` within `radius`. Returns their

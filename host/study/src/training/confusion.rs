@@ -3,6 +3,7 @@
 //! Unknown detections are treated as plants. So there are two kinds of error: a plant classified as a weed is cut, and
 //! a weed classified as a plant or unknown is left.
 
+use crate::table::optional;
 use control::ground::class::Class;
 use field::row::Kind;
 use std::fmt;
@@ -47,18 +48,18 @@ impl Confusion {
     }
 
     /// Weeds that the machine would spare, including unknown ones.
-    pub fn weeds_taken_for_plants(&self) -> usize {
+    pub fn weeds_left(&self) -> usize {
         self.of(Kind::Weed, Class::Plant) + self.of(Kind::Weed, Class::Unknown)
     }
 
-    /// Share of detections that the machine treats correctly, from 0 to 1.
-    pub fn accuracy(&self) -> f64 {
-        1.0 - share(self.plants_taken_for_weeds() + self.weeds_taken_for_plants(), self.total())
+    /// Share of detections that the machine treats correctly, from 0 to 1. `None` without detections.
+    pub fn accuracy(&self) -> Option<f64> {
+        share(self.total() - self.plants_taken_for_weeds() - self.weeds_left(), self.total())
     }
 
     /// The errors, worst first: plants cut, weeds spared, plants unknown.
     pub(super) fn harm(&self) -> (usize, usize, usize) {
-        (self.plants_taken_for_weeds(), self.weeds_taken_for_plants(), self.of(Kind::Plant, Class::Unknown))
+        (self.plants_taken_for_weeds(), self.weeds_left(), self.of(Kind::Plant, Class::Unknown))
     }
 }
 
@@ -70,15 +71,21 @@ impl fmt::Display for Confusion {
             table.add_row([name.to_owned()].into_iter().chain(counts));
         }
         writeln!(f, "{table}")?;
-        let percent = |part: usize, total: usize| format!("{part} of {total}, {:.2} %", 100.0 * share(part, total));
-        let (plants, weeds) = (self.count(Kind::Plant), self.count(Kind::Weed));
-        writeln!(f, "Plants classified as weeds   {}", percent(self.plants_taken_for_weeds(), plants))?;
-        writeln!(f, "Weeds classified as plants   {}", percent(self.weeds_taken_for_plants(), weeds))?;
-        writeln!(f, "Plants spared unknown    {}", percent(self.of(Kind::Plant, Class::Unknown), plants))?;
-        write!(f, "Treated as they should   {:.2} % of all", 100.0 * self.accuracy())
+        let percent = |share: Option<f64>| optional(share, |share| format!("{:.2} %", 100.0 * share));
+        let errors = [
+            ("Plants classified as weeds", Kind::Plant, self.plants_taken_for_weeds()),
+            ("Weeds left standing", Kind::Weed, self.weeds_left()),
+            ("Plants spared unknown", Kind::Plant, self.of(Kind::Plant, Class::Unknown)),
+        ];
+        for (name, kind, part) in errors {
+            let total = self.count(kind);
+            writeln!(f, "{name:<28} {part} of {total}, {}", percent(share(part, total)))?;
+        }
+        write!(f, "{:<28} {} of all", "Treated as they should", percent(self.accuracy()))
     }
 }
 
-fn share(part: usize, total: usize) -> f64 {
-    if total == 0 { 0.0 } else { part as f64 / total as f64 }
+/// A part of a total, from 0 to 1. `None` if the total is 0.
+fn share(part: usize, total: usize) -> Option<f64> {
+    (total > 0).then(|| part as f64 / total as f64)
 }

@@ -3,12 +3,16 @@
 //! The header names the five features and `label`, in any order. Other columns are ignored. So are lines that begin
 //! with `#`, and the `ok` that ends the console's answer. All features are whole numbers. A label is `plant`, `weed`,
 //! or empty for an unlabelled detection.
+//!
+//! The console's `dump` takes nothing away, so dumps overlap. A detection that is saved twice would make its own
+//! neighbour, and leaving one out would test nothing. So [`read_labelled`] reads equal lines once.
 
-use super::Labelled;
+use super::{Labelled, label_of};
 use control::ground::features::Features;
 use field::row::Kind;
 use files::FileError;
 use files::csv_table::{CsvTable, Line};
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 /// The columns of the features, in the order of [`Features::values`].
@@ -16,6 +20,9 @@ pub const COLUMNS: [&str; 5] = ["speed_mm_s", "spacing_mm", "delay_mm", "hold_mm
 
 /// The column of the label.
 pub const LABEL: &str = "label";
+
+/// Columns that may tell where a detection was. They keep detections with equal features apart.
+pub const PLACE: [&str; 2] = ["row", "position"];
 
 /// An object that was recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,31 +41,50 @@ pub fn read(path: &Path) -> Result<Vec<Recorded>, FileError> {
     CsvTable::read(path, &COLUMNS)?.lines().map(object).collect()
 }
 
-/// Reads detections of both classes from files that together make one table. Returns the labelled ones, and the number
-/// of unlabelled ones.
+/// Detections to learn from, and what was passed over.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ToLearn {
+    /// The labelled detections, each once.
+    pub labelled: Vec<Labelled>,
+    /// Number of lines without a label.
+    pub unlabelled: usize,
+    /// Number of lines that repeat an earlier one: features, label, and place if the table has it.
+    pub repeated: usize,
+}
+
+/// Reads detections of both classes from files that together make one table.
 ///
 /// # Errors
 /// Names the file, the line and what would be right.
-pub fn read_labelled(paths: &[PathBuf]) -> Result<(Vec<Labelled>, usize), FileError> {
+pub fn read_labelled(paths: &[PathBuf]) -> Result<ToLearn, FileError> {
     let columns: Vec<&str> = COLUMNS.into_iter().chain([LABEL]).collect();
     let tables = paths.iter().map(|path| CsvTable::read(path, &columns)).collect::<Result<Vec<_>, _>>()?;
-    let (mut labelled, mut unlabelled, mut last) = (Vec::new(), 0, None);
+    let (mut read, mut seen, mut last) = (ToLearn::default(), HashSet::new(), None);
     for line in tables.iter().flat_map(CsvTable::lines) {
         let Recorded { features, kind } = object(line)?;
         match kind {
-            Some(kind) => labelled.push(Labelled { features, kind }),
-            None => unlabelled += 1,
+            None => read.unlabelled += 1,
+            Some(kind)
+                if seen.insert((
+                    *features.values(),
+                    label_of(kind),
+                    PLACE.map(|column| line.text(column).to_owned()),
+                )) =>
+            {
+                read.labelled.push(Labelled { features, kind });
+            }
+            Some(_) => read.repeated += 1,
         }
         last = Some(line);
     }
-    let has = |kind: Kind| labelled.iter().any(|object: &Labelled| object.kind == kind);
+    let has = |kind: Kind| read.labelled.iter().any(|object: &Labelled| object.kind == kind);
     let missing = [Kind::Plant, Kind::Weed].into_iter().find(|&kind| !has(kind));
     match (missing, last) {
         (Some(kind), Some(line)) => {
             Err(line
                 .error(format!("up to here there is no {LABEL} {kind}: some detections of either class are needed")))
         }
-        _ => Ok((labelled, unlabelled)),
+        _ => Ok(read),
     }
 }
 
