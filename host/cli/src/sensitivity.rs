@@ -12,6 +12,7 @@ use std::str::FromStr;
 use study::experiment::{Engine, Experiment, Treatment, totals};
 use study::statistics::Share;
 use study::sweep::{SPACINGS_CM, SPEEDS_KM_H};
+use study::table::{distinct, optional, visible};
 use uno_run::report::number_table;
 
 /// The default changes. The guard is for the default spacing.
@@ -107,6 +108,8 @@ impl Change {
 /// Runs it and prints the table.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let Arguments { changes, field, speeds, spacing, replications, seed } = arguments;
+    // In the order of `totals`.
+    let speeds = distinct(speeds.iter().copied());
     let conditions = source::field(field)?;
     let experiment = Experiment {
         speeds_km_h: speeds.clone(),
@@ -141,12 +144,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
                 alarms += total.plots.alarms;
             }
             let (damaged, seen) = effect.injured_of_seen();
-            let unseen = match effect.all_unseen {
-                0 => "-".to_owned(),
-                all => format!("{:.1}", Share::of(effect.unseen, all).percent()),
-            };
+            let percent = |share: Share, decimals| optional(share.percent(), |percent| visible(percent, decimals));
+            let damage = percent(Share::of(damaged, seen), 2);
+            let unseen = percent(Share::of(effect.unseen, effect.all_unseen), 1);
             let weeded = totals.iter().map(|total| format!("{:.1}", 100.0 * total.plots.weeded_share));
-            let results = [format!("{:.2}", Share::of(damaged, seen).percent()), unseen, alarms.to_string()];
+            let results = [damage, unseen, alarms.to_string()];
             let cells = if change.0.is_empty() {
                 ["as in the field".to_owned(), String::new(), String::new()]
             } else {

@@ -18,7 +18,7 @@ use std::sync::LazyLock;
 use study::experiment::{PlotOutcome, Treatment};
 use study::shard::Shard;
 use study::sweep::{Axis, Point, RESULTS, SPACINGS_CM, SPEEDS_KM_H, Sweep};
-use study::table::in_two_lines;
+use study::table::{in_two_lines, optional, visible};
 use uno_run::report::number_table;
 
 /// The name of the command in its parts.
@@ -219,11 +219,8 @@ fn place(point: &Point) -> impl Iterator<Item = f64> {
 
 /// A value as text: with a mark if alarms make it invalid, and a dash if there is none.
 fn shown(value: f64, point: &Point) -> String {
-    match (value.is_finite(), point.has_alarm) {
-        (false, _) => "-".to_owned(),
-        (true, true) => format!("{value:.1} !"),
-        (true, false) => format!("{value:.1}"),
-    }
+    let text = optional(value.is_finite().then_some(value), |value| visible(value, 1));
+    if value.is_finite() && point.has_alarm { text + " !" } else { text }
 }
 
 /// A line a value of the second axis, a column a value of the first.

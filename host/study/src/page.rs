@@ -11,7 +11,7 @@ use crate::evaluation::published::{Coefficients, MACHINES};
 use crate::evaluation::{Analysis, Response, ResponseAnalysis};
 use crate::experiment::{Total, Treatment};
 use crate::statistics::{Mean, NoModel};
-use crate::table::{Table, distinct, fixed, optional, short, significant};
+use crate::table::{NOTHING, Table, distinct, fixed, optional, short, significant, visible};
 use anyhow::{Context, Result};
 use askama::Template;
 use chart::{Look, Series};
@@ -69,11 +69,11 @@ impl Page<'_> {
     fn results(&self) -> Table {
         let records = &self.analysis.records;
         let damage = self.analysis.damage();
-        let mut rows = vec![vec![
-            "plants damaged".to_owned(),
-            format!("{} %", damage.shown()),
-            format!("{} %, {}, of {} plants", damage, damage.kind(), damage.of),
-        ]];
+        let (value, basis) = match damage.of {
+            0 => (NOTHING.to_owned(), "counted in no plot".to_owned()),
+            of => (format!("{} %", damage.shown()), format!("{damage} %, {}, of {of} plants", damage.kind())),
+        };
+        let mut rows = vec![vec!["plants damaged".to_owned(), value, basis]];
         let efficiencies = records.iter().filter_map(|plot| plot.performance().weeding_efficiency_percent);
         let efficiencies: Vec<f64> = efficiencies.collect();
         if !efficiencies.is_empty() {
@@ -93,9 +93,9 @@ impl Page<'_> {
                 format!("with all margins kept at most {} %", fixed(100.0 * total.plots.weedable_share, 1)),
             ]);
         }
-        let area: f64 = records.iter().filter_map(|record| record.area_m2).sum();
-        if area > 0.0 {
-            let plots = counted(records.len(), "plot");
+        let areas: Vec<f64> = records.iter().filter_map(|record| record.area_m2).collect();
+        if !areas.is_empty() {
+            let (area, plots) = (areas.iter().sum(), counted(areas.len(), "plot"));
             rows.push(vec!["ground".to_owned(), format!("{} m²", fixed(area, 0)), format!("in {plots}")]);
         }
         let from = self.parameters.iter().find(|(name, _)| ["field", "plots from"].contains(&name.as_str()));
@@ -138,13 +138,18 @@ struct Controllers {
 }
 
 /// A measure of the controllers: title, unit and caption of its chart, the caption of its table, and its value.
-type Measure = ([&'static str; 3], &'static str, fn(&Total) -> f64);
+/// The value is `None` if there is nothing to count.
+type Measure = ([&'static str; 3], &'static str, fn(&Total) -> Option<f64>);
 
 const MEASURES: [Measure; 3] = [
     (
-        ["Plant damage", "% of the plants", "Share of the plants whose stem zone the tool entered. Lower is better."],
+        [
+            "Plant damage",
+            "% of the plants",
+            "Share of the plants whose stem zone a tool entered: the tool in the row, a sweep, or the tool of the next row. Plants that no beam sees are included. Lower is better.",
+        ],
         "Plants damaged by each controller, %",
-        Total::plant_damage_percent,
+        |total| total.damage().percent(),
     ),
     (
         [
@@ -153,7 +158,7 @@ const MEASURES: [Measure; 3] = [
             "Share of the row's ground that the tool worked. Higher is better, but above the line it costs margins or zones.",
         ],
         "Ground of the row weeded by each controller, %",
-        |total| 100.0 * total.plots.weeded_share,
+        |total| Some(100.0 * total.plots.weeded_share),
     ),
     (
         [
@@ -162,7 +167,7 @@ const MEASURES: [Measure; 3] = [
             "Share of the zones over which the tool was not fully out. A zone is a plant's protected stretch without the margin. Lower is better.",
         ],
         "Zones reached by each controller, %",
-        Total::zones_reached_percent,
+        |total| total.zones_reached().percent(),
     ),
 ];
 
@@ -172,13 +177,13 @@ const BOUND: &str = "most with every zone and margin kept";
 impl Controllers {
     fn of(totals: &[Total]) -> Result<Self> {
         let of = |controller| totals.iter().filter(move |total| total.plots.controller == controller);
-        let curve = |name: &str, look, controller, value: fn(&Total) -> f64| Series {
-            line: of(controller).map(|total| (total.speed_km_h(), value(total))).collect(),
+        let curve = |name: &str, look, controller, value: fn(&Total) -> Option<f64>| Series {
+            line: of(controller).filter_map(|total| Some((total.speed_km_h(), value(total)?))).collect(),
             ..Series::of(name, look)
         };
         // The largest share that this servo can weed is that of every controller.
         let first = totals.first().map_or(Treatment::Firmware, |total| total.plots.controller);
-        let bound = curve(BOUND, Look::LIMIT, first, |total| 100.0 * total.plots.weedable_share);
+        let bound = curve(BOUND, Look::LIMIT, first, |total| Some(100.0 * total.plots.weedable_share));
         let present = || Treatment::ALL.into_iter().filter(|&controller| of(controller).next().is_some());
         let (mut figures, mut tables) = (Vec::new(), Vec::new());
         for ((chart, table, value), bound) in MEASURES.into_iter().zip([None, Some(bound), None]) {
@@ -207,7 +212,7 @@ fn by_speed(caption: &str, curves: &[Series]) -> Table {
     let mut table = Table::new(caption, ["speed"].into_iter().chain(names));
     for speed in speeds {
         let value = |curve: &Series| curve.line.iter().find(|point| point.0 == speed).map(|point| point.1);
-        let cells = curves.iter().map(|curve| optional(value(curve), |value| fixed(value, 1)));
+        let cells = curves.iter().map(|curve| optional(value(curve), |value| visible(value, 1)));
         table.rows.push([format!("{} km/h", short(speed))].into_iter().chain(cells).collect());
     }
     table

@@ -22,6 +22,9 @@ pub const SPACINGS_CM: (f64, f64) = (5.0, 500.0);
 
 const MOST_VALUES: usize = 1000;
 
+/// Smaller steps would give equal values, because values have three decimals.
+const LEAST_STEP: f64 = 1e-3;
+
 /// A parameter and its values.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Axis {
@@ -47,8 +50,8 @@ impl FromStr for Axis {
         // A step more or less by rounding does not lose the last value.
         let steps = (to - from) / step + 1e-9;
         ensure!(
-            step > 0.0 && (0.0..MOST_VALUES as f64).contains(&steps),
-            "`{text}` has to go up, in steps above 0, with at most {MOST_VALUES} values"
+            step >= LEAST_STEP && (0.0..MOST_VALUES as f64).contains(&steps),
+            "`{text}` has to go up, in steps of {LEAST_STEP} or more, with at most {MOST_VALUES} values"
         );
         // Three decimals are kept, so that 0.1 + 0.2 is 0.3.
         let values = (0..=steps as u32).map(|index| ((from + f64::from(index) * step) * 1e3).round() / 1e3).collect();
@@ -85,7 +88,7 @@ fn results(outcome: &PlotOutcome, rows: u32) -> [f64; RESULTS.len()] {
         known(performance.field_efficiency_percent),
         known(performance.performance_index),
         100.0 * f64::from(outcome.alarms) / f64::from(rows),
-        Share::of(outcome.zones.reached, outcome.zones.all).percent(),
+        known(Share::of(outcome.zones.reached, outcome.zones.all).percent()),
     ]
 }
 
@@ -260,7 +263,7 @@ mod tests {
         for text in ["lead_out_ms", "lead_out_ms=0..300", "=", "speed=a..b:c", "speed=0..inf:1"] {
             assert!(error(text).contains("has to be NAME=FROM..TO:STEP"), "{text}");
         }
-        for text in ["speed=4..1:1", "speed=1..4:0", "speed=1..4:-1", "speed=0..1000000:1"] {
+        for text in ["speed=4..1:1", "speed=1..4:0", "speed=1..4:-1", "speed=0..1000000:1", "speed=1..1.002:0.0005"] {
             assert!(error(text).contains("has to go up"), "{text}");
         }
     }

@@ -80,6 +80,13 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     if value < 0.0 && !is_zero { format!("\u{2212}{digits}") } else { digits }
 }
 
+/// A number with `decimals` decimal places. A small one has two significant digits instead, so that it never reads as 0.
+pub fn visible(value: f64, decimals: usize) -> String {
+    let places = if value == 0.0 { 0.0 } else { 1.0 - value.abs().log10().floor() };
+    let reads_as_0 = value.abs() < 0.5 * 0.1_f64.powi(decimals as i32);
+    fixed(value, if reads_as_0 { decimals.max(places as usize) } else { decimals })
+}
+
 /// A number with at most six decimal places, without trailing zeros.
 pub fn short(value: f64) -> String {
     let digits = fixed(value, 6);
@@ -122,5 +129,8 @@ mod tests {
         assert_eq!(significant(-1e-17), "0");
         assert_eq!(probability(0.000_4), "< 0.001");
         assert_eq!(optional(None, short), NOTHING);
+        let small = [(0.0, 1), (0.06, 1), (0.0219, 1), (0.004, 2), (0.006, 2), (4.56e-8, 1)];
+        let shown = small.map(|(value, decimals)| visible(value, decimals));
+        assert_eq!(shown, ["0.0", "0.1", "0.022", "0.0040", "0.01", "0.000000046"]);
     }
 }

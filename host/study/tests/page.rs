@@ -86,8 +86,13 @@ fn row() -> String {
 
 /// A page with all parts.
 fn full_page() -> String {
+    page_of(&totals())
+}
+
+/// A page with all parts, of these totals.
+fn page_of(totals: &[Total]) -> String {
     let parameters = [("seed".to_owned(), "7".to_owned()), ("engine".to_owned(), "native".to_owned())];
-    let (analysis, totals, row) = (trial(true), totals(), row());
+    let (analysis, row) = (trial(true), row());
     let page = Page {
         title: "A trial",
         summary: vec!["No plant was damaged.".to_owned(), "Most weeds are gone.".to_owned()],
@@ -96,7 +101,7 @@ fn full_page() -> String {
         parameters: &parameters,
         analysis: &analysis,
         log: None,
-        totals: &totals,
+        totals,
         row: Some(&row),
     };
     page.html().unwrap()
@@ -195,7 +200,7 @@ fn the_simulated_machine_stands_beside_published_ones_and_is_marked() {
     let xml = closed(&html);
     let rows = cells(&parse(&xml), "This machine, simulated, and machines in fields");
     assert_eq!(rows[1][0], "this firmware, SIMULATED");
-    assert_eq!(rows[1][3..6], ["2.5", "41.3 in the row, \u{2013} in the plot", "0.0 (below 3.0)"]);
+    assert_eq!(rows[1][3..6], ["2.5", "41.3 in the row, \u{2013} in the plot", "0.0 (below 3.1)"]);
     let jia = rows.iter().find(|row| row[0].starts_with("Jia")).unwrap();
     assert_eq!(jia[3..6], ["4 to 7", "95.8", "0.6"]);
     assert!(rows.iter().skip(2).all(|row| !row[0].contains("SIMULATED") && !row[6].is_empty()));
@@ -321,9 +326,30 @@ fn zones_reached_stand_beside_damage_and_the_page_says_how_they_differ() {
     let damage = cells(&page, "Plants damaged by each controller, %");
     assert_eq!(damage[1], ["2.5 km/h", "0.0", "2.9", "14.2", "0.0"]);
     let words = text(page.root_element()).replace('\n', " ");
-    for difference in ["touched the zone round its stem", "not fully out of the row over it"] {
+    for difference in
+        ["a sweep when the machine strays", "touched the zone round its stem", "not fully out of the row over it"]
+    {
         assert!(words.contains(difference), "{difference}");
     }
+}
+
+#[test]
+fn small_damage_does_not_read_as_0_and_what_was_not_counted_reads_as_nothing() {
+    let mut totals = totals();
+    totals[4].plots.effect = Effect { plants: 4800, damaged: 1, ..Effect::default() };
+    totals[4].plots.zones = Zones::default();
+    let xml = closed(&page_of(&totals));
+    let page = parse(&xml);
+    let first = |caption: &str| cells(&page, caption)[1][1].clone();
+    assert_eq!(first("Plants damaged by each controller, %"), "0.021");
+    assert_eq!(first("Zones reached by each controller, %"), "\u{2013}");
+    let mut records = trial(true).records;
+    records.iter_mut().for_each(|plot| (plot.plants, plot.damaged) = (None, None));
+    records[1..].iter_mut().for_each(|plot| plot.area_m2 = None);
+    let xml = closed(&plain_page("Not counted", &[], &Analysis::of(records).unwrap()));
+    let results = cells(&parse(&xml), "Result");
+    assert_eq!(results[0], ["plants damaged", "\u{2013}", "counted in no plot"]);
+    assert_eq!(results[2], ["ground", "20 m²", "in 1 plot"]);
 }
 
 #[test]

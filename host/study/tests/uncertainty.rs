@@ -66,8 +66,28 @@ fn none_of_many_is_below_three_by_their_number_and_all_of_them_above() {
     let all = Share::of(5_u32, 5_u32);
     assert_close(all.least_percent, 100.0 * 0.549280271653059);
     assert_eq!((all.greatest_percent, all.to_string()), (100.0, "above 54.9".to_owned()));
-    assert_eq!(Share::of(13_u32, 1318_u32).to_string(), "0.53 to 1.68");
     assert_eq!(Share::of(0_u32, 0_u32).to_string(), "none counted");
+    assert_eq!((Share::of(0_u32, 0_u32).shown().as_str(), Share::of(0_u32, 0_u32).percent()), ("\u{2013}", None));
+}
+
+/// ```r
+/// binom.test(13, 1318)$conf.int[1:2]; binom.test(1, 12735)$conf.int[1:2]; binom.test(1, 1e9)$conf.int[1:2]
+/// binom.test(0, 91, alternative = "less")$conf.int[2]; binom.test(0, 1e9, alternative = "less")$conf.int[2]
+/// binom.test(1e9, 1e9, alternative = "greater")$conf.int[1]
+/// ```
+#[test]
+fn an_interval_is_rounded_outward_and_no_end_above_0_reads_as_0() {
+    for (count, of, share, interval) in [
+        (13_u64, 1318_u64, "1.0", "0.52 to 1.69"),
+        (1, 12_735, "0.0079", "0.00019 to 0.044"),
+        (1, 1_000_000_000, "0.00000010", "0.0000000025 to 0.0000006"),
+        (0, 91, "0.0", "below 3.3"),
+        (0, 1_000_000_000, "0.0", "below 0.00000030"),
+        (1_000_000_000, 1_000_000_000, "100.0", "above 99.99999970"),
+    ] {
+        let of_all = Share::of(count, of);
+        assert_eq!((of_all.shown().as_str(), of_all.to_string().as_str()), (share, interval));
+    }
 }
 
 /// ```r

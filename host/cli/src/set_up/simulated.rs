@@ -38,8 +38,8 @@ pub fn table() -> Result<Table> {
                 number.clone(),
                 title.to_owned(),
                 format!("{:.1}", 100.0 * total.plots.weeded_share),
-                format!("{:.1}", total.damage_of_seen().percent()),
-                format!("{:.1}", total.zones_reached_percent()),
+                total.damage_of_seen().shown(),
+                total.zones_reached().shown(),
             ]);
         }
         anyhow::Ok(())
@@ -86,10 +86,10 @@ pub fn expected(settings: &Settings, tool_width_mm: f64) -> Result<String> {
     let totals = weeded(&conditions)?;
     let total = totals.first().context("no row was weeded")?;
     Ok(format!(
-        "{:.1} % of the row's ground weeded, and {:.1} % of the plants that the beam sees damaged, in the simulated \
+        "{:.1} % of the row's ground weeded, and {} % of the plants that the beam sees damaged, in the simulated \
          field {} at {SPEED_KM_H} km/h, with a tool of {tool_width_mm} mm",
         100.0 * total.plots.weeded_share,
-        total.damage_of_seen().percent(),
+        total.damage_of_seen().shown(),
         conditions::DEFAULT,
     ))
 }

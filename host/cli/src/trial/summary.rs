@@ -2,6 +2,7 @@
 
 use super::{Study, of};
 use field::tool_path::{Effect, unweeded_strip_mm};
+use std::cmp::Ordering::Equal;
 use study::evaluation::{Analysis, published};
 use study::experiment::{self, Experiment, PlotOutcome, Total, Treatment};
 use study::statistics::Share;
@@ -40,8 +41,8 @@ pub(super) fn summary(experiment: &Experiment, totals: &[Total]) -> Vec<String> 
     let Effect { damaged, unseen, swept, neighbours, .. } = weeds;
     if damaged + swept + neighbours > 0 {
         sentences.push(format!(
-            "Of the plants that the firmware's machine damaged, the tool hit {damaged}: the beam cannot see {unseen} of them. Sweeps cut \
-             {swept}, where the machine strays. The tool cut {neighbours} in the next row, where it swung aside."
+            "Of the plants that the firmware's machine damaged, the tool hit {damaged}. Sweeps cut {swept}, where the machine strays. The \
+             beam cannot see {unseen} of these. The tool cut {neighbours} in the next row, where it swung aside."
         ));
     }
     let strip_mm = unweeded_strip_mm(&experiment.conditions.machine(0), &experiment.conditions.machine);
@@ -77,23 +78,25 @@ pub(super) fn about(study: &Study) -> String {
     )
 }
 
-/// How many plants a controller damaged, and where it damaged most.
+/// How many plants a controller damaged, and the speed with the highest share.
 fn damage(totals: &[Total], controller: Treatment) -> String {
     let name = controller.title();
     let (damaged, plants) = of(totals, controller).fold((0, 0), |(damaged, plants), total| {
         (damaged + total.plots.effect.injured(), plants + total.plots.effect.plants)
     });
     let share = Share::of(damaged, plants);
-    let worst = of(totals, controller).max_by(|a, b| a.plant_damage_percent().total_cmp(&b.plant_damage_percent()));
+    let kind = share.kind();
+    let percent = |total: &&Total| total.damage().percent();
+    let worst = of(totals, controller).max_by(|a, b| percent(a).partial_cmp(&percent(b)).unwrap_or(Equal));
     match worst {
-        Some(worst) if damaged > 0 => format!(
-            "Plants damaged by {name}: {damaged} of {plants} ({} %, {}), most of them at {} km/h, {} %.",
-            share,
-            share.kind(),
-            worst.speed_km_h(),
-            worst.damage().shown()
-        ),
-        _ => format!("Plants damaged by {name}: none of {plants} ({share} %, {}).", share.kind()),
+        _ if plants == 0 => format!("Plants damaged by {name}: unknown, because no plant stands in the rows."),
+        Some(worst) if damaged > 0 => {
+            let (speed_km_h, most) = (worst.speed_km_h(), worst.damage().shown());
+            format!(
+                "Plants damaged by {name}: {damaged} of {plants} ({share} %, {kind}). The share is highest at {speed_km_h} km/h: {most} %."
+            )
+        }
+        _ => format!("Plants damaged by {name}: none of {plants} ({share} %, {kind})."),
     }
 }
 

@@ -7,7 +7,7 @@ use field::budget;
 use field::tool_path::WeedCount;
 use study::experiment::{Total, Treatment};
 use study::statistics::Share;
-use study::table::in_two_lines;
+use study::table::{in_two_lines, optional};
 use uno_run::report::number_table;
 
 /// A column: its heading, its value for a total, and the tables that have it.
@@ -29,8 +29,8 @@ const COLUMNS: [Column; 13] = [
     ("controller", |total| name(total.plots.controller).to_owned(), &[Brief, Plants, Ground]),
     ("seen plants\ndamaged, %", |total| interval(total.damage_of_seen()), &[Brief, Plants]),
     ("unseen\nplants, %", |total| without_interval(&interval(total.damage_of_unseen())), &[Plants]),
-    ("zones\nreached, %", |total| format!("{:.1}", total.zones_reached_percent()), &[Brief, Plants]),
-    ("margins\ncut, %", |total| format!("{:.1}", total.margins_cut_percent()), &[Plants]),
+    ("zones\nreached, %", |total| total.zones_reached().shown(), &[Brief, Plants]),
+    ("margins\ncut, %", |total| total.margins_cut().shown(), &[Plants]),
     ("rows with\nan alarm", |total| total.plots.alarms.to_string(), &[Plants]),
     ("row ground\nweeded, %", weeded, &[Brief, Ground]),
     ("most\nlost to, %", most_lost, &[Brief, Ground]),
@@ -90,10 +90,10 @@ fn weeded(total: &Total) -> String {
 
 /// The removed share of the weeds.
 fn gone(weeds: WeedCount) -> String {
-    weeds.efficiency_percent().map_or("-".to_owned(), |percent| format!("{percent:.1}"))
+    optional(weeds.efficiency_percent(), |percent| format!("{percent:.1}"))
 }
 
 /// A share and its interval.
 fn interval(share: Share) -> String {
-    if share.of == 0 { "-".to_owned() } else { format!("{} ({share})", share.shown()) }
+    if share.of == 0 { share.shown() } else { format!("{} ({share})", share.shown()) }
 }

@@ -165,6 +165,28 @@ fn a_sweep_shows_each_result_along_one_axis_and_one_result_along_two() {
 }
 
 #[test]
+fn a_field_without_plants_has_no_share_of_zones_reached() {
+    let folder = folder();
+    let none = format!("{SMALL}[crop]\nmissing_percent = 90\ndouble_percent = 0\n[weeds]\ntall_per_m = 5\n");
+    fs::write(folder.path().join("none.toml"), none).unwrap();
+    let field = ["--field", "none.toml", "--spacing", "500", "--json"];
+    let words = said(folder.path(), &[&["sweep", "--x", "plot.row_m=2..2:1"][..], &field].concat());
+    let value: Value = serde_json::from_str(&words).unwrap();
+    let point = &value["points"][0];
+    assert_eq!((&point["plant_damage"], &point["zones_reached"]), (&Value::Null, &Value::Null), "{point}");
+}
+
+#[test]
+fn sensitivity_has_a_column_for_each_speed_once_and_in_order() {
+    let folder = folder();
+    let table = |speeds: &str| {
+        let field = ["--field", "small.toml", "--replications", "1", "--speeds", speeds, "crop.sway_mm=15"];
+        said(folder.path(), &[&["sensitivity"][..], &field].concat())
+    };
+    assert_eq!(table("4,1,4"), table("1,4"));
+}
+
+#[test]
 fn the_help_of_a_sweep_lists_the_axes_with_their_ranges() {
     let help = said(Path::new("."), &["sweep", "--help"]);
     for (name, range) in [

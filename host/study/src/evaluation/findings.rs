@@ -3,7 +3,7 @@
 use super::table::LEAVE_OUT;
 use super::{Analysis, PlotRecord, Response, ResponseAnalysis, Treatment, nominal};
 use crate::statistics::{OddsTerm, SIGNIFICANCE, Share, Term, grouped, probability};
-use crate::table::{distinct, in_words, list};
+use crate::table::{distinct, in_words, list, optional, visible};
 use field::counted;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -107,6 +107,7 @@ impl Analysis {
         }
         let percent = |plot: &PlotRecord| plot.performance().plant_damage_percent;
         let most = self.records.iter().filter_map(percent).fold(0.0, f64::max);
+        let all = optional(share.percent(), |percent| visible(percent, 2));
         let worst = self.records.iter().filter(|plot| percent(plot).is_some_and(|percent| percent >= most));
         let place = |plot: &PlotRecord| {
             format!("replication {}, {} km/h, {} cm", plot.replication, plot.speed_km_h, plot.spacing_cm)
@@ -114,24 +115,33 @@ impl Analysis {
         let worst: Vec<String> = worst.map(place).collect();
         let kind = if worst.len() == 1 { "a plot" } else { "each of these plots" };
         format!(
-            "{count} of {of} plants were damaged: {:.2} %, {} {share} %. At most {most:.2} % in {kind}: {}.",
-            share.percent(),
+            "{count} of {of} plants were damaged: {all} %, {} {share} %. At most {} % in {kind}: {}.",
             share.kind(),
+            visible(most, 2),
             worst.join("; ")
         )
     }
 
     /// Differences from the paper's text: a sentence for each measure whose 95 % interval of the slope excludes the paper's
-    /// slope. One sentence if there is none.
+    /// slope. If there is none, one sentence names the compared measures. Another one names the measures whose slope the
+    /// paper has and this trial does not. Empty if no slope can be compared.
     pub fn against_the_paper(&self) -> Vec<String> {
-        let said: Vec<String> = self.responses.iter().filter_map(ResponseAnalysis::against_the_paper).collect();
-        let compared =
-            self.responses.iter().filter(|of| of.model.is_ok() && of.published.text.per_km_h.is_some()).count();
-        match (said.is_empty(), compared) {
-            (_, 0) => Vec::new(),
-            (true, _) => vec!["No slope by speed differs from the paper's.".to_owned()],
-            (false, _) => said,
+        let of_paper = self.responses.iter().filter(|of| of.published.text.per_km_h.is_some());
+        let (compared, without): (Vec<_>, Vec<_>) = of_paper.partition(|of| of.slope().is_some());
+        if compared.is_empty() {
+            return Vec::new();
         }
+        let names = |of: &[&ResponseAnalysis]| {
+            in_words(&of.iter().map(|of| of.response.title().to_lowercase()).collect::<Vec<_>>())
+        };
+        let mut said: Vec<String> = compared.iter().filter_map(|of| of.against_the_paper()).collect();
+        if said.is_empty() {
+            said.push(format!("No slope by speed differs from the paper's. Compared: {}.", names(&compared)));
+        }
+        if !without.is_empty() {
+            said.push(format!("Not compared, because this trial has no such slope: {}.", names(&without)));
+        }
+        said
     }
 }
 
@@ -151,13 +161,17 @@ impl ResponseAnalysis {
         }
     }
 
-    /// A difference from the paper's slope by speed.
-    fn against_the_paper(&self) -> Option<String> {
-        let paper = self.published.text.per_km_h?;
+    /// The slope by speed, and half the width of its 95 % interval. `None` without a model, speeds or scatter.
+    fn slope(&self) -> Option<(&Term, f64)> {
         let model = self.model.as_ref().ok()?;
         let term = model.term("speed").filter(|term| term.p.is_some())?;
         let distribution = StudentsT::new(0.0, 1.0, model.degrees_of_freedom as f64).ok()?;
-        let within = distribution.inverse_cdf(1.0 - SIGNIFICANCE / 2.0) * term.standard_error;
+        Some((term, distribution.inverse_cdf(1.0 - SIGNIFICANCE / 2.0) * term.standard_error))
+    }
+
+    /// A difference from the paper's slope by speed.
+    fn against_the_paper(&self) -> Option<String> {
+        let (paper, (term, within)) = self.published.text.per_km_h.zip(self.slope())?;
         ((term.estimate - paper).abs() > within).then(|| {
             format!(
                 "{} changes by {:+.2} ± {within:.2} for each km/h, where the paper's text has {paper:+}.",

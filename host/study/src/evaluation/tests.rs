@@ -54,3 +54,39 @@ fn a_treatment_has_the_means_of_its_plots() {
     assert_eq!(found, [(1.0, 1), (1.5, 2)]);
     assert!((treatments[1].mean.plant_damage_percent.unwrap() - 4.0).abs() < 1e-12);
 }
+
+#[test]
+fn a_small_share_of_damaged_plants_does_not_read_as_0() {
+    let plot = PlotRecord { plants: Some(25_000), ..PLOT };
+    let findings = Analysis::of(vec![plot]).unwrap().findings();
+    let said =
+        "1 of 25000 plants were damaged: 0.0040 %, two-sided 95 % interval 0.00010 to 0.023 %. At most 0.0040 % in";
+    assert!(findings[1].starts_with(said), "{findings:?}");
+}
+
+#[test]
+fn only_slopes_by_speed_that_the_trial_has_are_compared_with_the_paper_s() {
+    // Damage and weeding scatter around the paper's slopes, at these speeds.
+    let trial = |speeds_km_h: &[f64], damaged: &[u32]| {
+        let plots = speeds_km_h.iter().zip(damaged).zip(0..).map(|((&speed_km_h, &damaged), number)| PlotRecord {
+            speed_km_h,
+            replication: 1 + number,
+            plants: Some(1000),
+            damaged: Some(damaged),
+            weeds_after: Some(30 + 10 * speed_km_h as u32 + number % 3),
+            area_m2: None,
+            ..PLOT
+        });
+        Analysis::of(plots.collect()).unwrap().against_the_paper()
+    };
+    let speeds = [1.0, 2.0, 3.0, 4.0, 1.0, 2.0, 3.0, 4.0];
+    assert_eq!(trial(&[2.0; 8], &[3, 5, 4, 6, 2, 7, 3, 5]), [""; 0]);
+    let none = "No slope by speed differs from the paper's. Compared: ";
+    let without = "Not compared, because this trial has no such slope: ";
+    let said = trial(&speeds, &[10, 23, 34, 48, 12, 22, 37, 47]);
+    let without_area = format!("{without}performance index and field efficiency.");
+    assert_eq!(said, [format!("{none}plant damage and weeding efficiency."), without_area]);
+    let said = trial(&speeds, &[0; 8]);
+    let without_damage = format!("{without}plant damage, performance index and field efficiency.");
+    assert_eq!(said, [format!("{none}weeding efficiency."), without_damage]);
+}

@@ -18,7 +18,7 @@ impl Total {
         self.plots.record.speed_km_h
     }
 
-    /// Plants damaged by the tool or by sweeps, with the interval of their share.
+    /// Plants damaged by the tool, a sweep or the next row's tool, with the interval of their share (Eq. 23).
     pub fn damage(&self) -> Share {
         Share::of(self.plots.effect.injured(), self.plots.effect.plants)
     }
@@ -34,19 +34,14 @@ impl Total {
         Share::of(self.plots.effect.unseen, self.plots.effect.all_unseen)
     }
 
-    /// Plants damaged, % (Eq. 23).
-    pub fn plant_damage_percent(&self) -> f64 {
-        self.damage().percent()
+    /// Zones over which the tool was not fully out, of all.
+    pub fn zones_reached(&self) -> Share {
+        Share::of(self.plots.zones.reached, self.plots.zones.all)
     }
 
-    /// Zones over which the tool was not fully out, % of all.
-    pub fn zones_reached_percent(&self) -> f64 {
-        Share::of(self.plots.zones.reached, self.plots.zones.all).percent()
-    }
-
-    /// Other zones whose margin was cut, % of all.
-    pub fn margins_cut_percent(&self) -> f64 {
-        Share::of(self.plots.zones.margins_cut, self.plots.zones.all).percent()
+    /// Other zones whose margin was cut, of all.
+    pub fn margins_cut(&self) -> Share {
+        Share::of(self.plots.zones.margins_cut, self.plots.zones.all)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::chart::{Chart, Look, Series, key, range_of};
 use crate::evaluation::{Analysis, Response, ResponseAnalysis};
-use crate::table::{distinct, fixed, short};
+use crate::table::{distinct, fixed, short, visible};
 use anyhow::Result;
 
 /// A chart with its texts.
@@ -128,6 +128,6 @@ fn against_speed(title: &str, unit: &str, lines: impl IntoIterator<Item = String
 
 /// A line in words.
 fn said(Series { name, line, .. }: &Series) -> String {
-    let points: Vec<String> = line.iter().map(|(x, y)| format!("{} at {} km/h", fixed(*y, 1), short(*x))).collect();
+    let points: Vec<String> = line.iter().map(|(x, y)| format!("{} at {} km/h", visible(*y, 1), short(*x))).collect();
     format!(" {name}: {}.", points.join(", "))
 }

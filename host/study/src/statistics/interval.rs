@@ -1,16 +1,19 @@
 //! Intervals of figures: exact intervals of counted shares, and intervals of means.
 //!
 //! A share's interval is Clopper and Pearson's, by the quantiles of the beta distribution, as in R's `binom.test`. It
-//! covers the true share in at least 95 of 100 trials, for any number of plants. If none or all were counted, the 5 %
-//! lie on one side (R's `alternative = "less"` or `"greater"`). So none of `n` gives "below about `3 / n`". A mean's
-//! interval is Student's, as in R's `t.test`, over replications that are assumed independent.
+//! covers the true share in at least 95 of 100 trials if the plants are independent, for any number of plants. The plants
+//! of a row are not: they share its slip, steering and servo. If plots scatter by more than counting does, the interval
+//! covers less. If none or all were counted, the 5 % lie on one side (R's `alternative = "less"` or `"greater"`). So none
+//! of `n` gives "below about `3 / n`". A mean's interval is Student's, as in R's `t.test`, over replications that are
+//! assumed independent.
 
 use super::design::{mean, scatter};
+use crate::table::{fixed, optional, visible};
 use serde::Serialize;
 use statrs::distribution::{Beta, ContinuousCDF, Normal, StudentsT};
 use std::fmt::{self, Display, Formatter};
 
-/// The least probability that an interval covers the true figure.
+/// The least probability that an interval covers the true figure, if what is counted is independent.
 pub const CONFIDENCE: f64 = 0.95;
 
 /// A count out of a total, with the interval of its share.
@@ -44,15 +47,14 @@ impl Share {
         Self { count, of, least_percent, greatest_percent }
     }
 
-    /// The share itself, percent; 0 if the total is 0.
-    pub fn percent(&self) -> f64 {
-        100.0 * self.count as f64 / self.of.max(1) as f64
+    /// The share itself, percent; `None` if the total is 0.
+    pub fn percent(&self) -> Option<f64> {
+        (self.of > 0).then(|| 100.0 * self.count as f64 / self.of as f64)
     }
 
-    /// The share itself as text, percent: `0.5`, or a small one as exactly as its interval, `0.009`.
+    /// The share itself as text, percent: `0.5`, a small one as `0.0090`, and a dash if the total is 0.
     pub fn shown(&self) -> String {
-        let is_small = self.count > 0 && self.percent() < 0.05;
-        format!("{:.*}", if is_small { self.digits() } else { 1 }, self.percent())
+        optional(self.percent(), |percent| visible(percent, 1))
     }
 
     /// What kind of interval it has, in words. If none or all were counted, it has one end.
@@ -60,15 +62,31 @@ impl Share {
         if self.count == 0 || self.count >= self.of { "one-sided 95 % bound" } else { "two-sided 95 % interval" }
     }
 
-    /// The decimal places in which the interval's ends differ.
-    fn digits(&self) -> usize {
-        match self.greatest_percent - self.least_percent {
-            ..0.005 => 4,
-            ..0.05 => 3,
-            ..2.0 => 2,
-            _ => 1,
-        }
+    /// The lower end as text, rounded down. It has two significant digits or more, so it never reads as 0.
+    fn least(&self) -> String {
+        let places = 1.0 - self.least_percent.log10().floor();
+        rounded(self.least_percent, places.max(self.places()), f64::floor)
     }
+
+    /// The upper end as text, rounded up.
+    fn greatest(&self) -> String {
+        rounded(self.greatest_percent, self.places(), f64::ceil)
+    }
+
+    /// The decimal places in which the ends differ.
+    fn places(&self) -> f64 {
+        let width = self.greatest_percent - self.least_percent;
+        if width >= 2.0 { 1.0 } else { (-(width / 5.0).log10().floor()).max(2.0) }
+    }
+}
+
+/// A percentage as text, rounded to so many decimal places.
+fn rounded(percent: f64, places: f64, round: fn(f64) -> f64) -> String {
+    /// An `f64` has no more at 99 %.
+    const MOST_PLACES: f64 = 14.0;
+    let places = places.min(MOST_PLACES);
+    let scale = 10_f64.powf(places);
+    fixed(round(percent * scale) / scale, places as usize)
 }
 
 /// Bisections that give the quantile of any count below 2^64 to the last digit of an `f64`.
@@ -98,15 +116,14 @@ fn beta_quantile(a: f64, b: f64, probability: f64) -> f64 {
     greatest
 }
 
-/// The interval as text behind a share: `below 0.07` if none was counted, else `0.53 to 1.68`.
+/// The interval as text behind a share: `below 0.07` if none was counted, else `0.52 to 1.69`.
 impl Display for Share {
     fn fmt(&self, f: &mut Formatter) -> fmt::Result {
-        let digits = self.digits();
         match (self.count, self.of) {
             (_, 0) => f.write_str("none counted"),
-            (0, _) => write!(f, "below {:.digits$}", self.greatest_percent),
-            (count, of) if count == of => write!(f, "above {:.digits$}", self.least_percent),
-            _ => write!(f, "{:.digits$} to {:.digits$}", self.least_percent, self.greatest_percent),
+            (0, _) => write!(f, "below {}", self.greatest()),
+            (count, of) if count == of => write!(f, "above {}", self.least()),
+            _ => write!(f, "{} to {}", self.least(), self.greatest()),
         }
     }
 }
