@@ -3,7 +3,10 @@
 //! Encoder (D2, D3) and beams (D8, D10) belong to their interrupts. D9 is the servo timer's, D0 and D1 the USART's. Encoder and
 //! beams have external pull-ups; only the switches use internal ones.
 
-use avr_device::atmega328p::{PORTB, PORTD, portb};
+use avr_device::{
+    asm,
+    atmega328p::{PORTB, PORTD, portb},
+};
 use core::convert::Infallible;
 use embedded_hal::digital::{ErrorType, InputPin, OutputPin};
 
@@ -28,6 +31,9 @@ pub struct Pins<'a> {
 pub fn pins<'a>(port_b: &'a PORTB, port_d: &'a PORTD) -> Pins<'a> {
     port_b.ddrb.modify(|_, w| w.pb5().set_bit());
     port_d.portd.modify(|_, w| w.pd4().set_bit().pd5().set_bit());
+    // 10 ms: the pull-ups first charge the cables, and the capacitors of debounced contacts. A work switch that is open would
+    // else be read as closed, and opening it clears an alarm.
+    asm::delay_cycles(160_000);
     Pins { lamp: Lamp(port_b), work_switch: Switch(port_d), end_switch: Switch(port_d) }
 }
 

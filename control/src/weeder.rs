@@ -202,8 +202,9 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Takes an edge of the first beam, and the position at which it came.
     fn beam_edge(&mut self, position: Position, broken: bool) {
-        self.sensors.beam_broken = broken;
-        if broken && self.is_working() && self.sensors.encoder.beam_broke() {
+        let was_broken = core::mem::replace(&mut self.sensors.beam_broken, broken);
+        // A spike too short to be read gives no new level.
+        if broken && !was_broken && self.is_working() && self.sensors.encoder.beam_broke() {
             let flickers = self.sensors.beam.short_breaks() > 1;
             self.forget_and_raise(if flickers { Alarm::BeamFlickers } else { Alarm::EncoderSilent });
         }
@@ -276,6 +277,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         }
         let out = self.try_out().unwrap_or(!self.is_working() || self.must_be_out());
         if out != self.tool.is_out() {
+            self.count_unfollowed();
             self.tool.send(out, out && self.is_working() && !self.sensors.encoder.is_doubtful());
             self.events.add(Event::Swing { out, position });
         }
@@ -411,6 +413,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     fn enter(&mut self, state: State) {
         // `hold` and the switch also end a manual test.
         (self.bench, self.was_working) = (Bench::Idle, false);
+        self.tool.forget_swings();
         if state != self.state {
             self.state = state;
             self.events.add(Event::State(state));

@@ -72,8 +72,9 @@ impl Distance {
 /// Swings in and out: enough to meet the servo's quick and slow swings.
 const ROUNDS: u8 = 6;
 
-/// Time for a swing, several times as long as any servo needs.
-const SWING: u16 = Coarse::steps_in_ms(1500);
+/// Time for a swing, several times as long as any servo needs. It is no multiple of the servo's frame (20 ms), so the six swings in
+/// meet its start at different moments, and one of them hardly waits for the next pulse.
+const SWING: u16 = Coarse::steps_in_ms(1503);
 
 /// Longest wait of a command besides the servo's gap: the longest pulse on the line, and some turns of the loop.
 const SPARE_MS: u8 = 7;
@@ -235,7 +236,17 @@ mod tests {
     fn the_end_switch_gives_the_longest_swing_out_and_the_shortest_swing_in() {
         let (outcome, lasted_ms) = run([61, 180, 57, 195, 70, 170]);
         assert_eq!(outcome, Outcome::Measured(SwingTimes { out_ms: 195 + 11, in_ms: 57 - LATE_MS }));
-        assert_eq!(lasted_ms, 18_000);
+        assert_eq!(lasted_ms, 18_036);
+    }
+
+    #[test]
+    fn one_of_the_swings_in_waits_less_than_a_third_of_a_frame_for_its_pulse() {
+        let (frame, swing) = (1000 * u32::from(FRAME_MS), u32::from(SWING) * (1_000_000 / Coarse::STEPS_PER_SECOND));
+        let mut moments = [0, 1, 2, 3, 4, 5, 6].map(|round| 2 * round * swing % frame);
+        // The last stands for the first one of the next frame.
+        moments[usize::from(ROUNDS)] = frame;
+        moments.sort_unstable();
+        assert!(moments.windows(2).all(|pair| 3 * (pair[1] - pair[0]) < frame), "{moments:?}");
     }
 
     #[test]

@@ -23,6 +23,9 @@ named! {
 /// Steps of 1.024 ms after which a pulse counts as this old, because the clock wraps: longer than any lead.
 const SETTLED: u16 = 0x7FFF;
 
+/// Swings out in a row without the end switch after which the tool is stuck.
+const UNFOLLOWED: u8 = 3;
+
 /// The tool.
 #[derive(Clone, Debug)]
 pub struct Tool {
@@ -33,11 +36,14 @@ pub struct Tool {
     /// Whether the ground for which the tool left the row is yet to come.
     awaits_ground: bool,
     late: u16,
+    /// Swings out in a row that the end switch has not followed.
+    unfollowed: u8,
 }
 
 impl Tool {
     /// A tool before [`init`](Self::init).
-    pub const NONE: Self = Self { out: false, pulse: 0, since: Slow::ZERO, awaits_ground: false, late: 0 };
+    pub const NONE: Self =
+        Self { out: false, pulse: 0, since: Slow::ZERO, awaits_ground: false, late: 0, unfollowed: 0 };
 
     /// Starts with the tool out of the row.
     pub const fn init(&mut self, now: Slow) {
@@ -67,6 +73,25 @@ impl Tool {
     /// Whether the servo has had this pulse for this many milliseconds.
     pub fn has_held(&self, pulse: HalfMicros, now: Slow, milliseconds: u16) -> bool {
         pulse == self.pulse && self.is_settled(now, milliseconds)
+    }
+
+    /// A swing ends. One out of at least `least_ms` counts if the end switch has not followed it.
+    pub fn end_swing(&mut self, now: Slow, least_ms: u16, followed: bool) {
+        if followed {
+            self.unfollowed = 0;
+        } else if self.out && self.is_settled(now, least_ms) {
+            self.unfollowed += 1;
+        }
+    }
+
+    /// Whether the end switch has followed none of the last swings out.
+    pub const fn follows_no_swing(&self) -> bool {
+        self.unfollowed == UNFOLLOWED
+    }
+
+    /// Counts those swings from here on.
+    pub const fn forget_swings(&mut self) {
+        self.unfollowed = 0;
     }
 
     /// Closed ground has reached the tool. Returns whether the command came less than `milliseconds` before, and counts that.

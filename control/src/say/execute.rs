@@ -81,10 +81,7 @@ pub fn execute<C: Classifier, M: Memory>(command: &Command, controller: &mut Con
         }
         Action::TeachPlant | Action::TeachWeed => controller.teach(u8::from(matches!(action, Action::TeachPlant))),
         Action::Forget => controller.forget(number as u8),
-        Action::ForgetAll => {
-            controller.forget_all();
-            Ok(())
-        }
+        Action::ForgetAll => controller.forget_all(),
         Action::Hold => {
             controller.hold();
             Ok(())

@@ -149,14 +149,20 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Forgets a field example.
     ///
     /// # Errors
-    /// [`CommandError::NoSuchExample`].
+    /// [`CommandError::NotInHold`], as for [`teach`](Self::teach), and [`CommandError::NoSuchExample`].
     pub fn forget(&mut self, number: u8) -> Result<(), CommandError> {
+        self.expect_no_work()?;
         if self.classifier.forget(number) { Ok(()) } else { Err(CommandError::NoSuchExample) }
     }
 
-    /// Forgets all field examples.
-    pub fn forget_all(&mut self) {
+    /// Forgets all field examples. The console listens again only when all are erased.
+    ///
+    /// # Errors
+    /// [`CommandError::NotInHold`], as for [`teach`](Self::teach).
+    pub fn forget_all(&mut self) -> Result<(), CommandError> {
+        self.expect_no_work()?;
         self.classifier.forget_all();
+        Ok(())
     }
 
     /// Turns event lines on or off.

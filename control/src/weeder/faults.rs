@@ -14,6 +14,10 @@ use crate::{
 /// How much longer than the lead the end switch may take: a servo frame (20 ms), the contacts' bouncing, and a reserve.
 const END_SWITCH_GRACE_MS: u16 = 100;
 
+/// How much longer than the lead a swing out must last for its end to count: a servo frame, and what a lead may be shortened beside a
+/// stem zone. The contacts may still bounce.
+const END_SWITCH_LEAST_MS: u16 = 40;
+
 /// Least free stack in bytes for working: two interrupts' worth.
 const STACK_RESERVE: u16 = 48;
 
@@ -52,19 +56,33 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             return Some(Alarm::RolledBackTooFar);
         }
         self.sensors.end_switch.read(self.sensors.now, self.sensors.readings.end_switch_on);
-        if self.configuration.get(Setting::EndSwitch) != 0
-            && !self.bench.needs_no_end_switch()
-            && self.sensors.end_switch.is_on() != self.tool.is_out()
-            // After a manual test has ended, the tool has not had its command yet.
-            && self.tool.has_held(
-                self.pulse(),
-                self.sensors.readings.now.slow(),
-                self.configuration.get(Setting::LeadOutMs) + END_SWITCH_GRACE_MS,
-            )
+        if self.has_end_switch()
+            && (self.tool.follows_no_swing()
+                || self.sensors.end_switch.is_on() != self.tool.is_out()
+                // After a manual test has ended, the tool has not had its command yet.
+                && self.tool.has_held(
+                    self.pulse(),
+                    self.sensors.readings.now.slow(),
+                    self.configuration.get(Setting::LeadOutMs) + END_SWITCH_GRACE_MS,
+                ))
         {
             return Some(Alarm::ToolStuck);
         }
         (self.sensors.readings.stack_free < STACK_RESERVE).then_some(Alarm::StackLow)
+    }
+
+    /// Whether there is an end switch that the tool must follow.
+    fn has_end_switch(&self) -> bool {
+        self.configuration.get(Setting::EndSwitch) != 0 && !self.bench.needs_no_end_switch()
+    }
+
+    /// A swing ends. Counts those out that the end switch has not followed: at speed they may be too short for the alarm while they
+    /// last.
+    pub(super) fn count_unfollowed(&mut self) {
+        let least_ms = self.configuration.get(Setting::LeadOutMs) + END_SWITCH_LEAST_MS;
+        if self.has_end_switch() {
+            self.tool.end_swing(self.sensors.readings.now.slow(), least_ms, self.sensors.readings.end_switch_on);
+        }
     }
 
     /// Counts unknown detections and detections of unusual width while the machine works.

@@ -18,7 +18,7 @@ use control::{
     settings::Setting,
     units::{Instant, Position},
 };
-use drive::{Drive, TURN_US};
+use drive::{Drive, TICKS_A_METRE, TURN_US};
 use rig::{Beams, Rig};
 
 #[test]
@@ -140,6 +140,31 @@ fn a_tool_that_follows_within_its_time_is_no_alarm() {
         is_out[place] = drive.machine.tool_out();
     }
     assert_eq!(drive.alarm(), None);
+}
+
+#[test]
+fn a_tool_that_dies_in_the_row_is_an_alarm_at_a_speed_at_which_each_swing_is_short() {
+    for (dies_behind, alarm_behind) in [(u32::MAX, None), (5, Some(8))] {
+        let mut drive = Drive::at_work();
+        drive.machine.set(Setting::EndSwitch, 1).unwrap();
+        let (mut is_out, mut swings) = ([false; 360], 0);
+        let begin = drive.place;
+        for turn in 0..20_000 {
+            drive.beam((drive.place - begin) % (0.5 * TICKS_A_METRE) < 0.06 * TICKS_A_METRE);
+            // The servo is out 180 ms behind the command.
+            let (place, was_out) = (turn % is_out.len(), drive.machine.tool_out());
+            drive.machine.readings.end_switch_on = is_out[place] && swings < dies_behind;
+            drive.roll(1.3, 1.3 * TURN_US as f64 / 1e6);
+            is_out[place] = drive.machine.tool_out();
+            swings += u32::from(was_out && !is_out[place]);
+            if drive.alarm().is_some() {
+                break;
+            }
+        }
+        let alarm = drive.alarm().map(|alarm| (alarm, swings));
+        assert_eq!(alarm, alarm_behind.map(|swings| (Alarm::ToolStuck, swings)));
+        assert!(swings > 7, "{swings} swings");
+    }
 }
 
 #[test]

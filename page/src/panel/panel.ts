@@ -171,7 +171,7 @@ export class Panel {
 
     ask(command: string): Promise<string[]> {
         if (!this.#link) return Promise.reject(new NoMachine(english("noneConnected")));
-        if (this.#holdPending && command.startsWith("start"))
+        if (this.#holdPending && /^\s*start\b/i.test(command))
             return Promise.reject(new Refused(english("holdPending")));
         if (isHold(command)) return this.#link.hold().then(() => []);
         return this.#link.ask(command);
