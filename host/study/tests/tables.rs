@@ -189,6 +189,8 @@ fn the_damage_of_a_treatment_is_of_all_its_plants_and_in_its_interval() {
     assert_close(damaged.greatest_percent, 0.4611189473301202);
     let text = analysis.to_string();
     assert!(text.contains(&format!(" {} ({damaged})", damaged.shown())), "{text}");
+    let uncounted = Analysis::of(vec![PlotRecord { damaged: None, ..example()[0] }]).unwrap().to_string();
+    assert!(uncounted.contains(" \u{2013} (none counted)"), "{uncounted}");
 }
 
 /// `ols('y ~ speed + spacing')` with `y = 100 * (1 - after / before)`: one is -15 %.

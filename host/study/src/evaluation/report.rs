@@ -84,8 +84,7 @@ impl Analysis {
         for treatment in self.treatments() {
             let name = format!("{} km/h, {} cm", short(treatment.speed_km_h), short(treatment.spacing_cm));
             let [_, weeding, others @ ..] = measures(&treatment.mean);
-            let damage = optional(treatment.mean.plant_damage_percent, |_| treatment.damaged.shown());
-            let damage = format!("{damage} ({})", treatment.damaged);
+            let damage = format!("{} ({})", treatment.damaged.shown(), treatment.damaged);
             let weeding = treatment
                 .weeding_efficiency
                 .and_then(|mean| mean.within)
