@@ -128,8 +128,8 @@ impl Longest {
         let Some(place) = self.without_bound.first() else { return Ok(self.cycles.unwrap_or_default()) };
         let function = &place.function;
         Err(BoundsError(format!(
-            "{what} has a loop without a bound, at {} in {function}: give its bound, by a record in .loop_bounds or for the \
-             function, as in [loops] {function:?} = {{ passes = 9, because = \"..\" }}",
+            "{what} has a loop without a bound, or a call of more than 2^40 cycles, at {} in {function}: give a loop's bound, by a \
+             record in .loop_bounds or for the function, as in [loops] {function:?} = {{ passes = 9, because = \"..\" }}",
             place.address_and_line()
         )))
     }

@@ -179,7 +179,7 @@ fn in_words(bounds: &Bounds, held: &[Held], all: bool) -> String {
                  nested loops multiply."
             )),
             None => line(format!(
-                "The longest turn of the loop is not computed: {} loops without a bound.",
+                "The longest turn of the loop is not computed: {} loops without a bound, or with `wdr` only in a called function.",
                 turn.without_bound.len()
             )),
         }

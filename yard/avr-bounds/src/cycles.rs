@@ -8,10 +8,14 @@
 //! Paths that never end are left out, such as a loop that waits for the watchdog's reset.
 
 use crate::counted;
-use crate::paths::{circles, entering, loops, reaching, runs_once};
+use crate::decode::Operation;
+use crate::paths::{Nested, circles, entering, loops, reaching, runs_once};
 use crate::routine::{Edge, Node, Routine};
 use crate::values::Interrupts;
 use std::collections::{BTreeMap, BTreeSet};
+
+/// A longer time counts as unbounded: 19 hours at 16 MHz. So sums of the other times do not overflow.
+const MOST_CYCLES: u64 = 1 << 40;
 
 /// A longest time.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -62,7 +66,8 @@ pub(crate) struct Passes {
 pub(crate) enum Stretch {
     /// From the end of the instruction that clears the interrupt flag to the end of the one that sets it.
     FlagClear,
-    /// From one moment at which an interrupt can be served to the next, with one instruction before and one after.
+    /// From one moment at which an interrupt can be served to the next, with one instruction before and one after, and
+    /// with the wake-up from a sleep.
     Closed,
 }
 
@@ -103,13 +108,15 @@ pub(crate) struct Stretches {
 /// Times routines, each once.
 pub(crate) struct Timer {
     passes: Passes,
+    /// Additional cycles of an interrupt that ends a sleep.
+    wake_up_cycles: u32,
     longest: BTreeMap<*const Routine, Option<Time>>,
     stretches: BTreeMap<(*const Routine, Stretch), Stretches>,
 }
 
 impl Timer {
-    pub(crate) fn new(passes: Passes) -> Timer {
-        Timer { passes, longest: BTreeMap::new(), stretches: BTreeMap::new() }
+    pub(crate) fn new(passes: Passes, wake_up_cycles: u32) -> Timer {
+        Timer { passes, wake_up_cycles, longest: BTreeMap::new(), stretches: BTreeMap::new() }
     }
 
     /// The longest path from a routine's entry to the end of a return; `None` if it never returns.
@@ -119,7 +126,7 @@ impl Timer {
         }
         let nodes = &routine.nodes;
         let returning = reaching(nodes, |node| nodes[node].returns.is_some());
-        let times = self.times(nodes, &|node| returning[node], vec![(0, Time::default())], Count::Whole);
+        let times = self.times(routine, &|node| returning[node], vec![(0, Time::default())], Count::Whole);
         let time = ends(nodes, &times);
         self.longest.insert(routine, time.clone());
         time
@@ -130,7 +137,7 @@ impl Timer {
         let nodes = &routine.nodes;
         let returning = reaching(nodes, |node| nodes[node].returns.is_some());
         let begin = || vec![(0, Time::default())];
-        let before = self.times(nodes, &|node| returning[node], begin(), Count::Whole);
+        let before = self.times(routine, &|node| returning[node], begin(), Count::Whole);
         let places: Vec<usize> = (0..nodes.len()).filter(|&node| is_place(&nodes[node])).collect();
         let (mut to, mut behind) = (None, Vec::new());
         for &place in &places {
@@ -139,11 +146,11 @@ impl Timer {
                 behind.push((edge.to, Time::default()));
             }
         }
-        let after = self.times(nodes, &|node| returning[node], behind, Count::Whole);
+        let after = self.times(routine, &|node| returning[node], behind, Count::Whole);
         let is_passed_again = places.iter().any(|&place| after[place].is_some());
         // Every path must pass one of the places.
         let is_other = |node| returning[node] && !places.contains(&node);
-        let others = self.times(nodes, &is_other, begin(), Count::Whole);
+        let others = self.times(routine, &is_other, begin(), Count::Whole);
         let is_passed_by = ends(nodes, &others).is_some() && !places.contains(&0);
         if is_passed_again || is_passed_by {
             return None;
@@ -168,14 +175,15 @@ impl Timer {
             // An instruction outside lets interrupts in before and after it.
             let alone = |cycles: u32| (kind == Stretch::Closed && !kind.has(node)).then(|| Time::of(cycles.into()));
             for edge in &node.edges {
+                let cycles = edge.cycles + self.waking(node);
                 let is_inside = kind.has(&nodes[edge.to]);
                 if let (Some(called), true) = (&edge.through, is_inside) {
                     begins.extend(self.stretches(called, kind).last.map(|last| (edge.to, last)));
                 }
                 if edge.through.is_none() && is_inside && !kind.has(node) {
-                    begins.push((edge.to, alone(edge.cycles).unwrap_or_default()));
+                    begins.push((edge.to, alone(cycles).unwrap_or_default()));
                 } else {
-                    found.inner = longer(found.inner, alone(edge.cycles));
+                    found.inner = longer(found.inner, alone(cycles));
                 }
             }
             found.inner = longer(found.inner, node.returns.and_then(alone));
@@ -187,6 +195,11 @@ impl Timer {
         }
         self.stretches.insert(key, found.clone());
         found
+    }
+
+    /// The cycles that an interrupt waits longer at the end of this instruction: those of the wake-up, if it is `sleep`.
+    fn waking(&self, node: &Node) -> u32 {
+        if node.instruction.operation == Operation::Sleep { self.wake_up_cycles } else { 0 }
     }
 
     /// The longest of the stretches with these beginnings: to a return, and to a moment with interrupts.
@@ -201,7 +214,8 @@ impl Timer {
         let mut ending = Vec::new();
         for node in nodes {
             let opening = node.edges.iter().filter(|edge| edge.through.is_none() && !kind.has(&nodes[edge.to]));
-            let mut end = opening.map(|edge| Some(Time::of(edge.cycles.into()))).fold(None, longer);
+            let waking = self.waking(node);
+            let mut end = opening.map(|edge| Some(Time::of((edge.cycles + waking).into()))).fold(None, longer);
             for (cycles, called) in node.calls() {
                 // The stretch continues in the called function. It ends at once if interrupts are on there.
                 let is_inside = kind.has(&called.nodes[0]);
@@ -212,7 +226,7 @@ impl Timer {
         }
         let leading =
             reaching(nodes, |node| kind.has(&nodes[node]) && (nodes[node].returns.is_some() || ending[node].is_some()));
-        let times = self.times(nodes, &|node| kind.has(&nodes[node]) && leading[node], begins, Count::Stretch(kind));
+        let times = self.times(routine, &|node| kind.has(&nodes[node]) && leading[node], begins, Count::Stretch(kind));
         let (mut to_return, mut to_open) = (None, longest);
         for ((node, time), end) in nodes.iter().zip(&times).zip(&ending) {
             let Some(time) = time else { continue };
@@ -228,14 +242,21 @@ impl Timer {
         (to_return, to_open)
     }
 
-    /// The longest turn of a loop that feeds the watchdog: from one `is_fed` to the next. `None` without such a loop.
+    /// The longest turn of a loop that feeds the watchdog: from one `is_fed` to the next. `None` without such a loop. The
+    /// turn of a loop that only a called function does so for is unknown.
     pub(crate) fn turn(&mut self, routine: &Routine, is_fed: impl Fn(&Node) -> bool) -> Option<Time> {
         let nodes = &routine.nodes;
         let mut turn = None;
+        let edges = |node: usize| nodes[node].edges.iter().map(|edge| edge.to).collect();
+        for circle in loops(&(0..nodes.len()).collect(), &edges) {
+            let mut places = circle.iter().map(|&node| &nodes[node]);
+            let caller = if places.clone().any(&is_fed) { None } else { places.find(|node| node.feeds()) };
+            turn = longer(turn, caller.map(|node| Time { cycles: 0, unbounded: [node.place.address].into() }));
+        }
         for fed in (0..nodes.len()).filter(|&node| is_fed(&nodes[node])) {
             let circle = reaching(nodes, |node| node == fed);
             let begins = nodes[fed].edges.iter().map(|edge| (edge.to, Time::of(edge.cycles.into()))).collect();
-            let times = self.times(nodes, &|node| node != fed && circle[node], begins, Count::Whole);
+            let times = self.times(routine, &|node| node != fed && circle[node], begins, Count::Whole);
             for (node, time) in nodes.iter().zip(&times) {
                 let Some(time) = time else { continue };
                 for edge in node.edges.iter().filter(|edge| edge.to == fed) {
@@ -260,7 +281,7 @@ impl Timer {
             (Some(called), Count::Stretch(kind)) => self.stretches(called, kind).through?,
         };
         let mut time = called.and_cycles(edge.cycles);
-        if node.waits {
+        if node.waits || time.unbounded.is_empty() && time.cycles > MOST_CYCLES {
             time.unbounded.insert(node.place.address);
         }
         Some(time)
@@ -270,7 +291,7 @@ impl Timer {
     fn of_length(routine: &Routine, length: u16) -> Option<Time> {
         let passes = vec![u64::from(length) + 1];
         let of_heads = routine.nodes.iter().map(|node| (node.place.address, passes.clone())).collect();
-        Timer::new(Passes { of_heads, ..Passes::default() }).longest(routine)
+        Timer::new(Passes { of_heads, ..Passes::default() }, 0).longest(routine)
     }
 
     /// The heads of a routine's own unbounded loops, except loops that it never leaves.
@@ -289,7 +310,7 @@ impl Timer {
                 let heads = if heads.is_empty() { circle.iter().copied().take(1).collect() } else { heads };
                 if is_left {
                     let begins = heads.iter().map(|&head| (head, Time::default())).collect();
-                    let times = self.times(nodes, &|node| circle.contains(&node), begins, Count::Own);
+                    let times = self.times(routine, &|node| circle.contains(&node), begins, Count::Own);
                     for time in times.iter().flatten() {
                         found.extend(&time.unbounded);
                     }
@@ -304,11 +325,12 @@ impl Timer {
     /// The longest time from the starting places to the beginning of each place, over places that are `within`.
     fn times(
         &mut self,
-        nodes: &[Node],
+        routine: &Routine,
         within: &dyn Fn(usize) -> bool,
         begins: Vec<(usize, Time)>,
         count: Count,
     ) -> Vec<Option<Time>> {
+        let nodes = &routine.nodes;
         let mut edges: Vec<Vec<(usize, Time)>> = Vec::with_capacity(nodes.len());
         for (number, node) in nodes.iter().enumerate() {
             let mut leading = Vec::new();
@@ -322,7 +344,7 @@ impl Timer {
             times[node] = longer(times[node].take(), Some(time));
         }
         let all = (0..nodes.len()).filter(|&node| within(node)).collect();
-        Paths { nodes, edges: &edges, passes: &self.passes }.fill(all, &BTreeSet::new(), 0, &mut times);
+        Paths { routine, edges: &edges, passes: &self.passes }.fill(all, &BTreeSet::new(), &mut times);
         times
     }
 }
@@ -335,23 +357,23 @@ fn ends(nodes: &[Node], times: &[Option<Time>]) -> Option<Time> {
 
 /// Longest paths over places and edges.
 struct Paths<'a> {
-    nodes: &'a [Node],
+    routine: &'a Routine,
     edges: &'a [Vec<(usize, Time)>],
     passes: &'a Passes,
 }
 
 impl Paths<'_> {
     fn address(&self, node: usize) -> u32 {
-        self.nodes[node].place.address
+        self.routine.nodes[node].place.address
     }
 
-    /// Propagates the times of the starting places to all others of a set at this loop depth, but not back to `heads`.
-    fn fill(&self, set: BTreeSet<usize>, heads: &BTreeSet<usize>, depth: usize, times: &mut [Option<Time>]) {
+    /// Propagates the times of the starting places to all others of a set, but not back to `heads`.
+    fn fill(&self, set: BTreeSet<usize>, heads: &BTreeSet<usize>, times: &mut [Option<Time>]) {
         let edges = |node: usize| self.edges[node].iter().filter(|(to, _)| set.contains(to) && !heads.contains(to));
         for circle in circles(&set, &|node| edges(node).map(|(to, _)| *to).collect()) {
             let is_loop = circle.len() > 1 || circle.iter().any(|&node| edges(node).any(|(to, _)| *to == node));
             if is_loop {
-                self.turn(&circle, depth, times);
+                self.turn(&circle, times);
             }
             for &node in &circle {
                 let Some(time) = times[node].clone() else { continue };
@@ -363,27 +385,23 @@ impl Paths<'_> {
     }
 
     /// Propagates the times at a loop's entries to all of its places.
-    fn turn(&self, circle: &BTreeSet<usize>, depth: usize, times: &mut [Option<Time>]) {
+    fn turn(&self, circle: &BTreeSet<usize>, times: &mut [Option<Time>]) {
         // In a loop with several entries, a turn is the path from one entry to the next. The loop turns as often as the
         // program passes any entry. A bound stated at one place is not valid for all of them.
         let heads: BTreeSet<usize> = circle.iter().copied().filter(|&node| times[node].is_some()).collect();
-        let mut passes = Some(0);
+        let mut passes = Some(0_u64);
         let mut entered: Option<Time> = None;
         let mut inside = vec![None; times.len()];
         for &head in &heads {
             let stated = if heads.len() == 1 { self.stated(circle, head) } else { None };
-            let stated = stated.or_else(|| {
-                let by_depth = self.passes.of_heads.get(&self.address(head))?;
-                by_depth.get(depth).or(by_depth.last()).copied()
-            });
-            let counted = || if heads.len() == 1 { counted::turns(self.nodes, circle, head) } else { None };
-            let stated = stated.or_else(counted);
-            passes = passes.zip(stated).map(|(passes, stated)| passes + stated);
+            let counted = || if heads.len() == 1 { counted::turns(&self.routine.nodes, circle, head) } else { None };
+            let stated = stated.or_else(|| self.listed(circle, head)).or_else(counted);
+            passes = passes.zip(stated).and_then(|(passes, stated)| passes.checked_add(stated));
             entered = longer(entered, times[head].clone());
             inside[head] = Some(Time::default());
         }
         let Some(entered) = entered else { return };
-        self.fill(circle.clone(), &heads, depth + 1, &mut inside);
+        self.fill(circle.clone(), &heads, &mut inside);
         let mut turn = None;
         for &node in circle {
             for (_, own) in self.edges[node].iter().filter(|(to, _)| heads.contains(to)) {
@@ -393,7 +411,7 @@ impl Paths<'_> {
         let turn = turn.unwrap_or_default();
         let cycles = turn.cycles.saturating_mul(passes.unwrap_or(1));
         let mut before_last = Time { cycles, unbounded: turn.unbounded };
-        if passes.is_none() {
+        if passes.is_none() || cycles > MOST_CYCLES {
             before_last.unbounded.extend(heads.iter().map(|&head| self.address(head)).min());
         }
         let entered = entered.and(&before_last);
@@ -402,12 +420,40 @@ impl Paths<'_> {
         }
     }
 
-    /// The loop bound that a place states, if the place is in no inner loop and every turn passes it.
+    /// The loops of the code that have a place in them, the outermost first.
+    fn around(&self, node: usize) -> Vec<&Nested> {
+        let address = self.address(node) as usize;
+        self.routine.nest.iter().filter(|around| around.places.contains(&address)).collect()
+    }
+
+    /// Whether a loop of the code has all of these places.
+    fn has(&self, around: &Nested, circle: &BTreeSet<usize>) -> bool {
+        circle.iter().all(|&node| around.places.contains(&(self.address(node) as usize)))
+    }
+
+    /// The bound of a table. A part of a routine can have an outer loop without its inner one, and begin within it. So
+    /// the place is passed as often as all loops around it turn, from the one that has the whole of `circle`.
+    fn listed(&self, circle: &BTreeSet<usize>, head: usize) -> Option<u64> {
+        let by_depth = self.passes.of_heads.get(&self.address(head))?;
+        let around = self.around(head);
+        let first = around.iter().rposition(|around| self.has(around, circle))?;
+        let passes = (first..around.len()).map(|depth| {
+            let passes = by_depth.get(depth).or(by_depth.last())?;
+            let Nested { heads, .. } = around[depth];
+            let is_head = depth + 1 == around.len() && heads.contains(&(self.address(head) as usize));
+            Some(if is_head { *passes } else { passes.saturating_mul(heads.len() as u64) })
+        });
+        passes.reduce(|one, other| Some(one?.saturating_mul(other?)))?
+    }
+
+    /// The loop bound that a place states, if the place is in no inner loop and every turn passes it. It is valid within
+    /// the innermost loop of the code around the place.
     fn stated(&self, circle: &BTreeSet<usize>, head: usize) -> Option<u64> {
         let saying = |node: usize| self.passes.stated.get(&self.address(node)).map(|passes| (node, *passes));
         let edges = |node: usize| -> Vec<usize> { self.edges[node].iter().map(|(to, _)| *to).collect() };
         let runs_once = runs_once(circle, head, &edges);
-        let stated = circle.iter().filter_map(|&node| saying(node));
+        let is_innermost = |node: usize| self.around(node).last().is_some_and(|around| self.has(around, circle));
+        let stated = circle.iter().filter_map(|&node| saying(node)).filter(|&(node, _)| is_innermost(node));
         stated.filter(|&(node, _)| runs_once(node)).map(|(_, passes)| passes).min()
     }
 }

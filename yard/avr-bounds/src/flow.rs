@@ -32,11 +32,8 @@ use crate::values::{DEEPEST, INTERRUPT_FLAG, Interrupts, Known, Value};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::rc::Rc;
 
-/// EECR's bits that start a read and a write, and how long they halt the core (data sheets, EEPROM data memory).
-const EERE: u16 = 0;
-const EEPE: u16 = 1;
-const READ_HALT_CYCLES: u32 = 4;
-const WRITE_HALT_CYCLES: u32 = 2;
+/// The most calls within calls. Each takes some of the host's stack: 2 MB are enough for 300.
+const MOST_NESTED: usize = 200;
 
 /// SREG's bit of the last result being zero.
 const ZERO_FLAG: u16 = 1;
@@ -172,15 +169,24 @@ impl<'a> Code<'a> {
                 circle.join(", which calls ")
             )));
         }
+        if self.open.len() == MOST_NESTED {
+            return Err(BoundsError(format!(
+                "{MOST_NESTED} functions call each other on the way to {}, and the analysis follows no more: call fewer within each \
+                 other, or lower their depth in [recursion]",
+                self.name(entry.address)
+            )));
+        }
         self.open.push(entry);
         let routine = Routine {
             entry,
             nodes: Vec::new(),
+            nest: Vec::new(),
             returns: BTreeSet::new(),
             keeps: Registers::ALL,
             leaves_zero: true,
             deepest: Vec::new(),
             deepest_interrupted: None,
+            feeds: false,
             enables: None,
         };
         let follower =
@@ -220,7 +226,11 @@ impl Follower<'_, '_> {
         let is_on = |place: &Place| place.interrupts == Interrupts::On;
         let deepest_interrupted = self.deepest(is_on, |routine| routine.deepest_interrupted.as_ref());
         let leaves_zero = self.routine.leaves_zero || kind == Kind::Function && self.returns_zero();
-        Ok(Routine { deepest, deepest_interrupted, leaves_zero, ..self.routine })
+        let nodes = &self.routine.nodes;
+        let returning = paths::reaching(nodes, |node| nodes[node].returns.is_some());
+        let feeds = nodes.iter().zip(returning).any(|(node, returns)| returns && node.feeds());
+        let nest = paths::nest(nodes);
+        Ok(Routine { nest, feeds, deepest, deepest_interrupted, leaves_zero, ..self.routine })
     }
 
     /// Whether R1 is zero at every return, also where a loop counts it down to zero.
@@ -304,8 +314,8 @@ impl Follower<'_, '_> {
         if place.interrupts == Interrupts::On {
             known.kept = [Value::Unknown; 3];
         }
-        let cycles =
-            instruction.cycles + chip.more_cycles(instruction.operation) + halt_cycles(&instruction, chip.eecr);
+        let halt_cycles = chip.halt_cycles(&instruction, known.written(&instruction));
+        let cycles = instruction.cycles + chip.more_cycles(instruction.operation) + halt_cycles;
         if known.interrupts == Interrupts::Soon {
             known.interrupts = Interrupts::On;
         }
@@ -483,18 +493,5 @@ impl Follower<'_, '_> {
             self.routine.nodes[from].ends_in.push((after.cycles, called));
         }
         Ok(())
-    }
-}
-
-/// Cycles that the EEPROM halts the core. A write of the whole register may start either, so the longer one counts.
-fn halt_cycles(instruction: &Instruction, eecr: u16) -> u32 {
-    match (instruction.operation, instruction.data_address()) {
-        (Sbi, Some(address)) if address == eecr => match instruction.operand('b') {
-            EERE => READ_HALT_CYCLES,
-            EEPE => WRITE_HALT_CYCLES,
-            _ => 0,
-        },
-        (Out | Sts, Some(address)) if address == eecr => READ_HALT_CYCLES,
-        _ => 0,
     }
 }

@@ -32,7 +32,7 @@
 //!
 //! - the chip's synchroniser;
 //! - the longest other handler, or the rest of this handler after its read;
-//! - the longest stretch of the main program in which no interrupt is served;
+//! - the longest stretch of the main program in which no interrupt is served, with a wake-up from sleep;
 //! - the interrupt response;
 //! - the handler up to its read.
 //!
@@ -76,9 +76,6 @@ use self::routine::{Entry, Kind, Node, Routine, bytes};
 use self::values::Interrupts;
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
-
-/// Additional cycles of a response in sleep, without the oscillator's start (data sheets, interrupt response time).
-const WAKE_UP_CYCLES: u64 = 4;
 
 /// The most cycles from an edge at a pin to its interrupt request. An edge that comes up to this time before a read may
 /// also be missed by that read (data sheet, pin change interrupt timing, and reading the pin value).
@@ -135,7 +132,7 @@ pub fn prove(elf: &Program, budgets: &Budgets) -> Result<Bounds, BoundsError> {
             elf.start, elf.start
         )));
     }
-    let mut timer = Timer::new(passes(&code, budgets));
+    let mut timer = Timer::new(passes(&code, budgets), elf.chip.wake_up_cycles() as u32);
     let (critical_section, closed) = [Stretch::FlagClear, Stretch::Closed]
         .map(|kind| timer.stretches(&main, kind).inner.map(|time| time.longest(&code)))
         .map(|longest| longest.unwrap_or(Longest { cycles: Some(0), without_bound: Vec::new() }))
@@ -191,7 +188,7 @@ fn time_handlers(
 ) -> Vec<Handler> {
     let mut nodes = code.routines().flat_map(|routine| &routine.nodes);
     let sleeps = nodes.any(|node| node.instruction.operation == Operation::Sleep);
-    let response = code.elf.chip.response_cycles() + if sleeps { WAKE_UP_CYCLES } else { 0 };
+    let response = code.elf.chip.response_cycles() + if sleeps { code.elf.chip.wake_up_cycles() } else { 0 };
     let longest = |(&vector, handler): (&u8, &Rc<Routine>)| {
         let longest = timer.longest(handler).map(|time| time.and(&Time::of(response)).longest(code));
         (vector, longest.unwrap_or_default())

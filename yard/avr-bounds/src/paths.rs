@@ -67,6 +67,36 @@ pub(crate) fn loops(set: &BTreeSet<usize>, edges: Edges) -> Vec<BTreeSet<usize>>
     circles(set, edges).into_iter().filter(is_loop).collect()
 }
 
+/// A loop in the code of a routine.
+pub(crate) struct Nested {
+    /// The addresses in it.
+    pub(crate) places: BTreeSet<usize>,
+    /// The addresses at which it is entered.
+    pub(crate) heads: BTreeSet<usize>,
+}
+
+/// The loops in a routine's code, each before the loops within it. A place is an address here, with any stack and any
+/// state of the interrupts, as in the source.
+pub(crate) fn nest(nodes: &[Node]) -> Vec<Nested> {
+    let address = |node: &Node| node.place.address as usize;
+    let mut edges: BTreeMap<usize, BTreeSet<usize>> = BTreeMap::new();
+    for node in nodes {
+        edges.entry(address(node)).or_default().extend(node.edges.iter().map(|edge| address(&nodes[edge.to])));
+    }
+    let mut nest = Vec::new();
+    let mut to_do: Vec<(BTreeSet<usize>, BTreeSet<usize>)> = vec![(edges.keys().copied().collect(), BTreeSet::new())];
+    while let Some((set, heads)) = to_do.pop() {
+        for places in loops(&set, &|place| edges[&place].difference(&heads).copied().collect()) {
+            let entering = edges.iter().filter(|(from, _)| !places.contains(from)).flat_map(|(_, to)| to);
+            let heads: BTreeSet<usize> =
+                entering.copied().chain([address(&nodes[0])]).filter(|to| places.contains(to)).collect();
+            to_do.push((places.clone(), heads.clone()));
+            nest.push(Nested { places, heads });
+        }
+    }
+    nest
+}
+
 /// Whether a place of a loop runs exactly once a turn: no inner loop has it, and every turn from `head` passes it.
 pub(crate) fn runs_once<'a>(circle: &'a BTreeSet<usize>, head: usize, edges: Edges<'a>) -> impl Fn(usize) -> bool + 'a {
     let loops_without = move |left_out: usize| {

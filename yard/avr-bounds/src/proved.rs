@@ -37,7 +37,7 @@ impl Place {
 pub struct Longest {
     /// Cycles; `None` if a part of it has no bound.
     pub cycles: Option<u64>,
-    /// The unbounded parts: loops, and instructions that wait.
+    /// The unbounded parts: loops, instructions that wait, and what takes more than 2^40 cycles.
     pub without_bound: Vec<Place>,
 }
 
@@ -154,11 +154,12 @@ pub struct Bounds {
     /// clears it to the end of the one that sets it; 0 if it is never cleared. The time before interrupts are first
     /// turned on does not count.
     pub critical_section: Longest,
-    /// The longest time between two moments at which the main program lets interrupts in.
+    /// The longest time between two moments at which the main program lets interrupts in, with the wake-up from a sleep.
     pub closed: Longest,
     /// The watched input.
     pub edges: Option<EdgeBounds>,
     /// The longest turn of the main loop, from `wdr` to `wdr`, without handlers and sleep; `None` if no loop has one.
+    /// Without a bound if a loop has it only in a called function.
     pub turn: Option<Longest>,
     /// Every loop without a bound, except those that the program never leaves.
     pub loops_without_bound: Vec<Place>,

@@ -45,31 +45,32 @@ impl Reach {
         let handlers = vectors.into_iter().flat_map(|first| {
             (0..u32::from(elf.chip.vectors)).map(move |vector| first + vector * elf.chip.vector_bytes)
         });
-        let mut roots: BTreeSet<u32> = elf.functions.keys().copied().chain([elf.start]).chain(handlers).collect();
-        let mut returning = BTreeSet::new();
-        loop {
-            let follow = |&root: &u32| {
-                (root, paths(elf, root, &elf.table_jumps, |_| false, |called| returning.contains(&called)))
-            };
-            let all: BTreeMap<u32, Paths> = roots.iter().map(follow).collect();
-            let before = (roots.len(), returning.len());
-            roots.extend(all.values().flat_map(|paths| &paths.called));
-            returning.extend(all.iter().filter(|(_, paths)| paths.returns).map(|(root, _)| *root));
-            if before != (roots.len(), returning.len()) {
-                continue;
+        let mut to_do: Vec<u32> = elf.functions.keys().copied().chain([elf.start]).chain(handlers).collect();
+        let (mut all, mut returning) = (BTreeMap::<u32, Paths>::new(), BTreeSet::new());
+        let mut callers: BTreeMap<u32, BTreeSet<u32>> = BTreeMap::new();
+        while let Some(root) = to_do.pop() {
+            let found = paths(elf, root, &elf.table_jumps, |_| false, |called| returning.contains(&called));
+            for &called in &found.called {
+                callers.entry(called).or_default().insert(root);
+                to_do.extend((called != root && !all.contains_key(&called)).then_some(called));
             }
-            let mut reach = Reach::default();
-            for (root, found) in all {
-                let words = found.places.iter().filter_map(|&place| Instruction::at(&elf.flash, place));
-                reach.code.extend(words.flat_map(|instruction| (instruction.address..instruction.next()).step_by(2)));
-                reach.called.extend(found.called);
-                reach.tables.extend(found.tables);
-                reach.functions.insert(root, found.places);
+            // Behind a call of it, paths go on.
+            if found.returns && returning.insert(root) {
+                to_do.extend(callers.get(&root).into_iter().flatten());
             }
-            let is_other = |place: u32| place != elf.start && elf.functions.contains_key(&place);
-            reach.start_up = paths(elf, elf.start, &BTreeSet::new(), is_other, |_| false).places;
-            return reach;
+            all.insert(root, found);
         }
+        let mut reach = Reach::default();
+        for (root, found) in all {
+            let words = found.places.iter().filter_map(|&place| Instruction::at(&elf.flash, place));
+            reach.code.extend(words.flat_map(|instruction| (instruction.address..instruction.next()).step_by(2)));
+            reach.called.extend(found.called);
+            reach.tables.extend(found.tables);
+            reach.functions.insert(root, found.places);
+        }
+        let is_other = |place: u32| place != elf.start && elf.functions.contains_key(&place);
+        reach.start_up = paths(elf, elf.start, &BTreeSet::new(), is_other, |_| false).places;
+        reach
     }
 
     /// Every instruction's address.

@@ -2,8 +2,9 @@
 //!
 //! `flow` follows the program's paths and makes it. `paths` finds loops in it, and `counted`, `cycles` and `registers` read it.
 
-use crate::decode::Instruction;
+use crate::decode::{Instruction, Operation};
 use crate::effects::Registers;
+use crate::paths::Nested;
 use crate::proved::Frame;
 use crate::values::{Constants, Interrupts};
 use std::collections::BTreeSet;
@@ -72,6 +73,12 @@ impl Node {
         Node { place, instruction, edges: Vec::new(), returns: None, ends_in: Vec::new(), waits: false }
     }
 
+    /// Whether it feeds the watchdog, by itself or in a function that returns to it.
+    pub(crate) fn feeds(&self) -> bool {
+        let mut through = self.edges.iter().filter_map(|edge| edge.through.as_ref());
+        self.instruction.operation == Operation::Wdr || through.any(|called| called.feeds)
+    }
+
     /// The routines that it calls, with the cycles of the call.
     pub(crate) fn calls(&self) -> impl Iterator<Item = (u32, &Rc<Routine>)> {
         let returning = self.edges.iter().filter_map(|edge| Some((edge.cycles, edge.through.as_ref()?)));
@@ -89,6 +96,8 @@ pub(crate) struct Routine {
     pub(crate) entry: Entry,
     /// The reachable places; the first is the entry.
     pub(crate) nodes: Vec<Node>,
+    /// Its loops.
+    pub(crate) nest: Vec<Nested>,
     /// States of the interrupts after its returns: off, on.
     pub(crate) returns: BTreeSet<Interrupts>,
     /// Registers and flags with the same value at every return as at the entry.
@@ -98,6 +107,8 @@ pub(crate) struct Routine {
     /// The deepest stack, and the deepest stack with interrupts on: the bytes of each function, from the entry on.
     pub(crate) deepest: Vec<Frame>,
     pub(crate) deepest_interrupted: Option<Vec<Frame>>,
+    /// Whether it can feed the watchdog and return.
+    pub(crate) feeds: bool,
     /// The address where interrupts that were off at the entry are turned on, in it or in a called function.
     pub(crate) enables: Option<u32>,
 }

@@ -132,7 +132,7 @@ impl Targets {
         let (low, high) = (known.registers[Z], known.registers[Z + 1]);
         let slot = match (low, high) {
             (Value::Loaded(Some(low), true), Value::Loaded(Some(high), true)) => {
-                (high == low + 1 || (low, high) == (0, 0)).then_some(usize::from(low))
+                (low.checked_add(1) == Some(high)).then_some(usize::from(low))
             }
             _ => None,
         };

@@ -52,6 +52,8 @@ pub(crate) enum Value {
     Status(bool, bool),
     /// From memory, at this displacement from a pointer (`None`: a fixed address), and whether the pointer did so too.
     Loaded(Option<u8>, bool),
+    /// Of a pointer that was loaded, and that a load or a store has moved by this number of bytes.
+    Moved(u8),
     /// An unknown value, less a constant.
     Less(u8),
 }
@@ -204,6 +206,15 @@ impl Known {
         self.registers[lower + 1] = Value::StackHigh(below);
     }
 
+    /// The bytes that a pointer from memory has moved; `None` if it is no such pointer.
+    fn moved(&self, pointer: usize) -> Option<u8> {
+        match (self.registers[pointer], self.registers[pointer + 1]) {
+            (Value::Loaded(..), Value::Loaded(..)) => Some(0),
+            (Value::Moved(low), Value::Moved(high)) if low == high => Some(low),
+            _ => None,
+        }
+    }
+
     /// The stack position that a load or a store accesses, by a pointer with a known target.
     fn on_stack(&self, instruction: &Instruction) -> Option<usize> {
         let (pointer, by) = instruction.pointer()?;
@@ -282,16 +293,19 @@ impl Known {
         Some(if by < 0 { address.wrapping_add_signed(by.into()) } else { address })
     }
 
-    /// The stack's depth if this instruction sets the stack pointer to a constant, in a program that has started again.
-    pub(crate) fn starts_again(&self, instruction: &Instruction, chip: &Chip) -> Option<usize> {
-        let writes = match instruction.operation {
-            Out | Sts => instruction.data_address(),
+    /// The address in the data space that an instruction writes to, if it is known.
+    pub(crate) fn written(&self, instruction: &Instruction) -> Option<u16> {
+        match instruction.operation {
+            Out | Sts | Sbi | Cbi => instruction.data_address(),
             St | Std => self.pointed_at(instruction),
             _ => None,
-        };
-        let Some(Value::Constant(high)) = self.upper_half.filter(|_| self.restarts && writes == Some(SPL)) else {
-            return None;
-        };
+        }
+    }
+
+    /// The stack's depth if this instruction sets the stack pointer to a constant, in a program that has started again.
+    pub(crate) fn starts_again(&self, instruction: &Instruction, chip: &Chip) -> Option<usize> {
+        let sets = self.restarts && self.written(instruction) == Some(SPL);
+        let Some(Value::Constant(high)) = self.upper_half.filter(|_| sets) else { return None };
         let address = u16::from_be_bytes([high, self.constant(instruction.source)?]);
         chip.ram_last.checked_sub(address).map(usize::from)
     }
@@ -352,7 +366,7 @@ impl Known {
         chip: &Chip,
         is_start_up: bool,
     ) -> Result<(), Problem> {
-        use Value::{Constant, Less, Loaded, StackHigh, StackLow, Status, Unknown};
+        use Value::{Constant, Less, Loaded, Moved, StackHigh, StackLow, Status, Unknown};
 
         let (d, r) = (instruction.destination, instruction.source);
         let gpior =
@@ -412,9 +426,8 @@ impl Known {
             Ld | Ldd | Lpm | Elpm | St | Std => {
                 let (pointer, by) = instruction.pointer().unwrap_or_default();
                 let place = self.on_stack(instruction);
-                if matches!(instruction.operation, St | Std)
-                    && let Some(address) = self.pointed_at(instruction)
-                {
+                let moved = self.moved(pointer);
+                if let Some(address) = self.written(instruction) {
                     self.write(address, r, chip, is_start_up)?;
                 }
                 match instruction.operation {
@@ -425,9 +438,12 @@ impl Known {
                         }
                     }
                     _ => {
-                        let is_deep =
-                            self.registers[pointer..pointer + 2].iter().all(|value| matches!(value, Loaded(..)));
-                        let loaded = Loaded(Some(instruction.displacement()), is_deep);
+                        let at =
+                            |moved: u8| moved.checked_add(instruction.displacement())?.checked_add_signed(by.min(0));
+                        let loaded = match moved.map(at) {
+                            None => Loaded(Some(0), false),
+                            Some(at) => at.map_or(Unknown, |at| Loaded(Some(at), true)),
+                        };
                         let value = place.map_or(loaded, |place| lasting(self.stack[place]));
                         // If a pointer loads over itself, the second byte uses the pointer's old value.
                         self.registers[d] = value;
@@ -441,8 +457,10 @@ impl Known {
                             let [low, high] = address.wrapping_add_signed(by.into()).to_le_bytes();
                             (self.registers[pointer], self.registers[pointer + 1]) = (Constant(low), Constant(high));
                         }
-                        _ if matches!(self.registers[pointer], Loaded(..)) => {}
-                        _ => self.registers[pointer..pointer + 2].fill(Unknown),
+                        _ => {
+                            let moved = moved.and_then(|moved| moved.checked_add_signed(by));
+                            self.registers[pointer..pointer + 2].fill(moved.map_or(Unknown, Moved));
+                        }
                     }
                 }
             }

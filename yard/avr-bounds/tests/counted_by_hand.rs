@@ -1,76 +1,9 @@
-//! Proofs of small assembly programs. Their stack and cycles can be counted by hand.
+//! Proofs of small assembly programs. Their stack can be counted by hand.
 
-use avr_bounds::{Bounds, BoundsError, Budgets, Input, LoopBound, LoopBounds, Program, RegisterRule, prove};
-use std::io::Write;
-use std::process::{Command, Stdio};
+mod assembled;
 
-/// Assembles a program for the ATmega328P and proves its bounds. It begins at `start`. `handler` is INT0's, if there is
-/// one, and `other` is Timer0's. An unused vector leads to the reset, as in avr-libc.
-fn try_to_prove(program: &str, input: Option<&Input>) -> Result<Bounds, BoundsError> {
-    try_to_prove_with(program, input, &LoopBounds::new())
-}
-
-/// The same with loop bounds of its functions.
-fn try_to_prove_with(program: &str, input: Option<&Input>, loops: &LoopBounds) -> Result<Bounds, BoundsError> {
-    try_to_prove_by(program, &Budgets { input: input.cloned(), loops: loops.clone(), ..Budgets::default() })
-}
-
-/// The same with facts of any kind. Every time that a budget can limit must have a bound.
-fn try_to_prove_by(program: &str, facts: &Budgets) -> Result<Bounds, BoundsError> {
-    let elf = assembled(program);
-    let bounds = prove(&Program::read(elf.path(), Some("atmega328p"))?, facts)?;
-    let any = Some(u64::MAX);
-    Budgets { handler_cycles: any, critical_section_cycles: any, ..Budgets::default() }.hold(&bounds)?;
-    Ok(bounds)
-}
-
-/// The ELF of a program that begins at `start`.
-fn assembled(program: &str) -> tempfile::NamedTempFile {
-    assembled_for(program, false)
-}
-
-/// The same, with the vectors of an ATmega2560 if `is_large` is set.
-fn assembled_for(program: &str, is_large: bool) -> tempfile::NamedTempFile {
-    let used = |label: &str| if program.contains(&format!("{label}:")) { label.to_owned() } else { "0".to_owned() };
-    let vectors: String = (0..57)
-        .map(|vector| match vector {
-            0 => "jmp start\n".to_owned(),
-            1 => format!("jmp {}\n", used("handler")),
-            16 => format!("jmp {}\n", used("other")),
-            26.. if !is_large => String::new(),
-            _ => "jmp 0\n".to_owned(),
-        })
-        .collect();
-    let functions: String = (program.lines())
-        .filter_map(|line| line.trim().strip_suffix(':'))
-        .filter(|label| label.parse::<u8>().is_err())
-        .map(|label| format!(".type {label}, @function\n"))
-        .collect();
-    let elf = tempfile::NamedTempFile::new().expect("there is room for a file");
-    let mut gcc = Command::new("avr-gcc")
-        .args(["-mmcu=atmega328p", "-nostdlib", "-x", "assembler", "-", "-o"])
-        .arg(elf.path())
-        .stdin(Stdio::piped())
-        .spawn()
-        .unwrap_or_else(|error| panic!("avr-gcc could not be started ({error}): run ./setup.sh"));
-    let mut source = gcc.stdin.take().expect("it was asked for");
-    writeln!(source, "{functions}{vectors}{program}").expect("avr-gcc reads");
-    drop(source);
-    assert!(gcc.wait().expect("avr-gcc ends").success(), "{program}");
-    elf
-}
-
-#[track_caller]
-fn proved(program: &str) -> Bounds {
-    try_to_prove(program, None).unwrap_or_else(|error| panic!("{error}"))
-}
-
-/// Asserts that a program is refused with this message.
-#[track_caller]
-fn assert_refused(program: &str, words: &str) {
-    let error = try_to_prove(program, None).expect_err("it has no bounds").to_string();
-    assert!(error.contains(words), "{error}");
-}
+use assembled::{assembled, assembled_for, assert_refused, proved, try_to_prove_by};
+use avr_bounds::{Budgets, Program, RegisterRule, prove};
 
 #[test]
 fn the_stack_counts_pushes_and_calls_on_the_deepest_path() {
@@ -167,130 +100,6 @@ fn a_handler_comes_in_where_the_stack_is_deepest_with_interrupts_on() {
 }
 
 #[test]
-fn a_handler_s_time_is_its_longest_path_with_response_and_return() {
-    let bounds = proved(
-        "start:
-            sei
-        1:  rjmp 1b
-        handler:
-            push r24
-            in r24, 0x3f
-            out 0x1e, r24
-            sbic 0x09, 2
-            rjmp 2f
-            lds r24, 0x0100
-            inc r24
-            sts 0x0100, r24
-        2:
-            in r24, 0x1e
-            out 0x3f, r24
-            pop r24
-            reti",
-    );
-    // Response 4, jmp 3; push 2, in, out; sbic skips the jump 2; lds 2, inc 1, sts 2; in, out, pop 2, reti 4.
-    assert_eq!(bounds.handlers.len(), 1, "the vectors that lead to the reset are not used");
-    assert_eq!(bounds.handlers[0].longest.cycles, Some(4 + 3 + 4 + 2 + 5 + 8));
-    assert_eq!(bounds.handlers[0].function, "handler");
-    assert_eq!(bounds.handlers[0].stack_bytes, 3);
-}
-
-#[test]
-fn a_handler_that_jumps_away_for_ever_counts_for_the_stack_and_not_for_the_time() {
-    let bounds = proved(
-        "start:\n sei\n1: rjmp 1b\nhandler:\n sbrc r2, 0\n jmp stalled\n reti\nstalled:\n push r2\n push r3\n rcall waits\nwaits:\n rjmp waits",
-    );
-    // Response 4, jmp 3, sbrc over two words 3, reti 4.
-    assert_eq!(bounds.handlers[0].longest.cycles, Some(14));
-    assert_eq!(bounds.handlers[0].stack_bytes, 2 + 2 + 2);
-}
-
-#[test]
-fn a_nested_critical_section_ends_with_the_outer_one() {
-    let bounds = proved(
-        "start:
-            sei
-        1:  in r18, 0x3f
-            cli
-            rcall inner
-            out 0x3f, r18
-            nop
-            rcall inner
-            rjmp 1b
-        inner:
-            in r19, 0x3f
-            cli
-            nop
-            out 0x3f, r19
-            ret",
-    );
-    // rcall 3, in, cli, nop, out, ret 4, out.
-    assert_eq!(bounds.critical_section.cycles, Some(3 + 4 + 4 + 1));
-    // `cli` in front of it, `nop` behind it.
-    assert_eq!(bounds.closed.cycles, Some(1 + 12 + 1));
-}
-
-#[test]
-fn an_instruction_between_two_critical_sections_lets_nothing_in() {
-    let apart = proved("start:\n sei\n1: cli\n nop\n sei\n nop\n cli\n nop\n sei\n rjmp 1b");
-    assert_eq!((apart.critical_section.cycles, apart.closed.cycles), (Some(2), Some(1 + 2 + 2)));
-    // The instruction after the first `sei` is the second `cli`. So a waiting interrupt sees both sections as one.
-    let joined = proved("start:\n sei\n1: nop\n cli\n nop\n sei\n cli\n nop\n sei\n rjmp 1b");
-    assert_eq!((joined.critical_section.cycles, joined.closed.cycles), (Some(2), Some(1 + 2 + 1 + 2 + 2)));
-}
-
-#[test]
-fn a_path_that_waits_for_the_reset_is_no_critical_section() {
-    let bounds =
-        proved("start:\n sei\n1: sbrc r2, 0\n rcall gives_up\n cli\n sei\n rjmp 1b\ngives_up:\n cli\n2: wdr\n rjmp 2b");
-    assert_eq!(bounds.critical_section.cycles, Some(1));
-}
-
-/// INT0's input: one handler reads PIND, and it can count two edges between two reads.
-const INPUT: fn() -> Input = || Input { vectors: [1].into(), port: 0x29, edges_between_looks: 2, clock_hz: 16_000_000 };
-
-#[test]
-fn an_edge_waits_for_the_other_handler_a_critical_section_and_the_path_to_the_read() {
-    let program = "start:
-            sei
-        1:  nop
-            cli
-            nop
-            nop
-            sei
-            rjmp 1b
-        handler:
-            push r2
-            in r2, 0x09
-            pop r2
-            reti
-        other:
-            push r3
-            pop r3
-            reti";
-    let edges = try_to_prove(program, Some(&INPUT())).expect("it has bounds").edges.expect("they were asked for");
-    // Synchroniser 3; the other handler 4 + 3 + 4 + 4; cli, nop, nop, sei, rjmp 2; response 4, jmp 3, push 2, in 1.
-    assert_eq!(edges.wait_cycles, 3 + 15 + 6 + 10);
-    assert_eq!(edges.never_lost_per_s, 2 * 16_000_000 / 34);
-}
-
-#[test]
-fn a_handler_that_does_not_read_the_port_gives_no_bound_for_an_edge() {
-    let main = "start:\n sei\n1: rjmp 1b\n";
-    let refused = |handler: &str| {
-        try_to_prove(&format!("{main}{handler}"), Some(&INPUT())).expect_err("it has no bound").to_string()
-    };
-    for handler in
-        ["handler:\n reti", "handler:\n in r2, 9\n in r3, 9\n reti", "handler:\n sbrc r2, 0\n in r3, 9\n reti", ""]
-    {
-        assert!(refused(handler).contains("does not read the port at 0x29 exactly once"), "{handler}");
-    }
-    let second = Input { vectors: [16].into(), ..INPUT() };
-    let program = format!("{main}handler:\n reti\nother:\n in r2, 9\n reti");
-    let error = try_to_prove(&program, Some(&second)).expect_err("INT0 goes before it").to_string();
-    assert!(error.contains("vector 1 has priority over vector 16"), "{error}");
-}
-
-#[test]
 fn recursion_is_refused_with_its_circle() {
     assert_refused(
         "start:\n rcall one\n rjmp start\none:\n rcall two\n ret\ntwo:\n rcall one\n ret",
@@ -330,128 +139,6 @@ fn a_handler_that_lets_others_in_is_refused() {
     assert_refused(&format!("{main}handler:\n ret"), "ends a handler by `ret`");
 }
 
-#[test]
-fn a_loop_in_a_handler_or_in_a_critical_section_has_to_have_a_bound() {
-    let looping = "1: dec r24\n brne 1b\n";
-    assert_refused(
-        &format!("start:\n sei\n2: rjmp 2b\nhandler:\n {} reti", saving(looping)),
-        "the handler of vector 1 has a loop without a bound",
-    );
-    assert_refused(
-        &format!("start:\n sei\n2: cli\n {looping} sei\n rjmp 2b"),
-        "a stretch without interrupts has a loop without a bound",
-    );
-    // The start-up code may take any time before it turns interrupts on.
-    proved(&format!("start:\n {looping} sei\n2: rjmp 2b"));
-}
-
-/// A handler's body that saves and restores the registers that it changes.
-fn saving(body: &str) -> String {
-    format!(
-        "push r24\n push r25\n in r24, 0x3f\n push r24\n lds r24, 0x0100\n{body} pop r24\n out 0x3f, r24\n pop r25\n pop r24\n"
-    )
-}
-
-/// A record with the most executions of the next instruction.
-fn at_most(turns: u32) -> String {
-    format!("7: .pushsection .loop_bounds, \"\", @progbits\n .long 7b, {turns}\n .popsection\n")
-}
-
-#[test]
-fn a_loop_with_a_stated_bound_takes_its_turns_and_the_exit() {
-    let saved = "push r24\n push r25\n in r24, 0x3f\n push r24\n";
-    let restored = "pop r24\n out 0x3f, r24\n pop r25\n pop r24\n";
-    let handler =
-        |body: &str| format!("start:\n sei\n2: rjmp 2b\nhandler:\n {saved} ldi r24, 8\n{body} {restored} reti");
-    let cycles = |body: &str| proved(&handler(body)).handlers[0].longest.cycles.expect("it returns");
-    // Response 4, jmp 3, ldi 1, reti 4, and 7 each to save and to restore; eight turns of dec 1 and brne 2, and one more up to the
-    // way out, 2.
-    assert_eq!(cycles(&format!("1:\n {} dec r24\n brne 1b\n", at_most(8))), 26 + 8 * 3 + 2);
-    // Three turns of ldi 1, of the inner loop's eight with their way out, and of dec 1 and brne 2; the last one's way out is 1 shorter.
-    let inner = format!("3:\n {} dec r25\n brne 3b\n", at_most(8));
-    let outer = format!("1: ldi r25, 8\n {inner} {} dec r24\n brne 1b\n", at_most(3));
-    assert_eq!(cycles(&outer), 26 + 3 * (1 + 26 + 3) + (1 + 26 + 2));
-}
-
-#[test]
-fn a_record_that_a_turn_can_go_round_bounds_nothing() {
-    let main = "start:\n sei\n2: rjmp 2b\n";
-    let round = format!("1: sbrs r2, 0\n rjmp 3f\n {} nop\n3: dec r24\n brne 1b\n", at_most(8));
-    assert_refused(
-        &format!("{main}handler:\n {} reti", saving(&round)),
-        "the handler of vector 1 has a loop without a bound",
-    );
-    // The inner loop's record does not bound the outer loop.
-    let outer = format!("1: ldi r25, 8\n3:\n {} dec r25\n brne 3b\n dec r24\n brne 1b\n", at_most(8));
-    assert_refused(
-        &format!("{main}handler:\n {} reti", saving(&outer)),
-        "the handler of vector 1 has a loop without a bound",
-    );
-}
-
-#[test]
-fn a_bound_of_a_function_holds_for_each_of_its_loops_unless_a_record_is_at_one() {
-    let cycles = |body: &str, passes: &[u64]| {
-        let program = format!("start:\n clr r1\n1: wdr\n rcall waits\n rjmp 1b\nwaits:\n ldi r24, 8\n{body} ret");
-        let bound = LoopBound { passes: passes.into(), by_length: false, because: "it counts".into() };
-        let bounds = try_to_prove_with(&program, None, &[("waits".into(), bound)].into()).expect("it has bounds");
-        bounds.turn.expect("the watchdog is fed").cycles
-    };
-    // wdr 1, rcall 3, ldi 1, the turns and the exit, ret 4, rjmp 2.
-    assert_eq!(cycles("3: dec r24\n brne 3b\n", &[9]), Some(11 + 9 * 3 + 2));
-    assert_eq!(cycles(&format!("3:\n {} dec r24\n brne 3b\n", at_most(8)), &[9]), Some(11 + 8 * 3 + 2));
-    // Entered in its middle as well: by the longer way, sbrc 1 and rjmp 2; nine times by either beginning, and three cycles from
-    // one to the other at most.
-    let twice = "sbrc r2, 0\n rjmp 4f\n3: nop\n4: dec r24\n brne 3b\n";
-    assert_eq!(cycles(twice, &[9]), Some(11 + 3 + 2 * 9 * 3 + 2));
-    // Nine turns of ldi 1, of the inner loop's nine with their way out, and of dec 1 and brne 2; the last way out is 1 shorter.
-    let nested = "2: ldi r25, 3\n3: dec r25\n brne 3b\n dec r24\n brne 2b\n";
-    assert_eq!(cycles(nested, &[9]), Some(11 + 9 * (1 + 29 + 3) + (1 + 29 + 2)));
-    // The same, with another number for the loop within: three of its turns with their way out.
-    assert_eq!(cycles(nested, &[9, 3]), Some(11 + 9 * (1 + 11 + 3) + (1 + 11 + 2)));
-}
-
-#[test]
-fn a_function_that_goes_over_as_many_bytes_as_its_caller_says_does_so_where_that_is_a_constant() {
-    let cycles = |length: &str| {
-        let program = format!(
-            "start:\n clr r1\n1: wdr\n {length}\n rcall fills\n rjmp 1b\n\
-             fills:\n rjmp 3f\n2: st X+, r22\n3: subi r20, 1\n sbci r21, 0\n brcc 2b\n ret"
-        );
-        let bound = LoopBound { passes: vec![100], by_length: true, because: "a byte a turn".into() };
-        let bounds = try_to_prove_with(&program, None, &[("fills".into(), bound)].into()).expect("it has bounds");
-        bounds.turn.expect("the watchdog is fed").cycles.expect("every loop has a bound")
-    };
-    // A byte more is a turn more: st 2, subi 1, sbci 1, brcc 2.
-    assert_eq!(cycles("ldi r20, 8\n ldi r21, 0") - cycles("ldi r20, 7\n ldi r21, 0"), 6);
-    assert_eq!(cycles("ldi r20, 99\n ldi r21, 0"), cycles("mov r20, r2\n ldi r21, 0"), "the number of the table");
-    assert!(cycles("ldi r20, 0\n ldi r21, 1") > cycles("ldi r20, 255\n ldi r21, 0"));
-}
-
-#[test]
-fn a_bound_for_a_missing_function_is_refused() {
-    let bound = LoopBound { passes: vec![3], by_length: false, because: "it counted".into() };
-    let loops = LoopBounds::from([("gone".to_owned(), bound)]);
-    let error = try_to_prove_with("start: rjmp start", None, &loops).expect_err("it has no such function").to_string();
-    assert!(error.contains("no function of the program is called gone"), "{error}");
-}
-
-#[test]
-fn a_turn_of_the_loop_that_feeds_the_watchdog_has_a_bound_once_every_loop_in_it_has() {
-    let program = |record: &str| {
-        format!(
-            "start:\n sei\n1: wdr\n ldi r24, 8\n rcall waits\n rjmp 1b\nwaits:\n3:\n {record} dec r24\n brne 3b\n ret"
-        )
-    };
-    let turn = proved(&program("")).turn.expect("the watchdog is fed");
-    assert_eq!((turn.cycles, turn.without_bound.len()), (None, 1));
-    assert_eq!(turn.without_bound[0].function, "waits");
-    // wdr 1, ldi 1, rcall 3, eight turns and the way out, ret 4, rjmp 2.
-    let turn = proved(&program(&at_most(8))).turn.expect("the watchdog is fed");
-    assert_eq!(turn.cycles, Some(1 + 1 + 3 + 26 + 4 + 2));
-    assert_eq!(proved("start:\n rjmp start").turn, None);
-}
-
 /// A program whose first function calls the second one, with r1 zero.
 fn calling(caller: &str, called: &str) -> String {
     format!("start:\n clr r1\n sei\n1: rcall caller\n rjmp 1b\ncaller:\n {caller}\n ret\ncalled:\n {called}\n ret")
@@ -473,89 +160,6 @@ fn a_handler_puts_every_register_and_every_flag_back() {
 #[test]
 fn words_that_are_no_instructions_are_refused() {
     assert_refused("start:\n .word 0xFFFF", "start reaches an address without an instruction of the chip, at 0x0068");
-}
-
-#[test]
-fn a_bound_over_its_budget_and_a_rate_under_it_are_reported() {
-    let budgets = |stack: u64, rate: u64| {
-        let file = tempfile::NamedTempFile::new().expect("there is room for a file");
-        let text = format!(
-            "stack_bytes = {stack}\nhandler_cycles = 14\ncritical_section_cycles = 0\nloops_without_bound = 0\nturn_cycles = 7\n\
-             never_lost_per_s = {rate}\n[input]\nvectors = [1]\nport = 0x29\nedges_between_looks = 2\n"
-        );
-        std::fs::write(file.path(), text).expect("it can be written");
-        Budgets::read(file.path()).expect("it is whole")
-    };
-    // A push and an interrupt: 3 bytes of stack. Response 4, jmp 3, sbic and nop 2, reti 4: 13 cycles.
-    let program = "start:\n sei\n1: wdr\n push r2\n pop r2\n rjmp 1b\nhandler:\n sbic 9, 0\n nop\n reti";
-    let bounds = try_to_prove(program, Some(&INPUT())).expect("it has bounds");
-    let rate = bounds.edges.as_ref().expect("they were asked for").never_lost_per_s;
-    let over = |budgets: Budgets| -> Vec<&str> {
-        budgets
-            .hold(&bounds)
-            .expect("every time has a bound")
-            .iter()
-            .filter(|held| !held.keeps)
-            .map(|held| held.name)
-            .collect()
-    };
-    assert_eq!(over(budgets(3, rate)), [""; 0]);
-    assert_eq!(over(budgets(2, rate + 1)), ["stack_bytes", "never_lost_per_s"]);
-    let error = Budgets::read("no-such.toml".as_ref()).expect_err("there is none").to_string();
-    assert!(error.starts_with("no-such.toml cannot be read: "), "{error}");
-}
-
-#[test]
-fn a_program_sleeps_with_interrupts_on_and_its_handlers_take_longer_to_answer() {
-    let handler = "handler:\n reti";
-    let bounds = proved(&format!("start:\n sei\n1: sleep\n rjmp 1b\n{handler}"));
-    // Response 4, out of sleep 4 more, jmp 3, reti 4.
-    assert_eq!(bounds.handlers[0].longest.cycles, Some(15));
-    // A sleep with interrupts off has no bound.
-    assert_refused(&format!("start:\n sei\n1: cli\n sleep\n sei\n rjmp 1b\n{handler}"), "a stretch without interrupts");
-}
-
-#[test]
-fn a_loop_that_counts_registers_from_a_constant_is_counted() {
-    let cycles = |set: &str, turn: &str| {
-        let program = format!("start:\n clr r1\n1: wdr\n rcall waits\n rjmp 1b\nwaits:\n {set}\n3: {turn}\n ret");
-        proved(&program).turn.expect("the watchdog is fed").cycles
-    };
-    // wdr 1, rcall 3, ret 4, rjmp 2; what is set, and the last turn's branch takes 1 less.
-    assert_eq!(cycles("ldi r24, 8", "dec r24\n brne 3b"), Some(10 + 1 + 8 * 3 - 1));
-    // Up to a limit, by two bytes, with a pointer, and by a register that holds the step.
-    assert_eq!(cycles("ldi r24, 0", "subi r24, 0xFF\n cpi r24, 10\n brne 3b"), Some(10 + 1 + 10 * 4 - 1));
-    assert_eq!(cycles("ldi r24, 0x2C\n ldi r25, 1", "subi r24, 1\n sbci r25, 0\n brne 3b"), Some(10 + 2 + 300 * 4 - 1));
-    assert_eq!(cycles("ldi r24, 0x2C\n ldi r25, 1", "sbiw r24, 1\n brne 3b"), Some(10 + 2 + 300 * 4 - 1));
-    assert_eq!(
-        cycles("ldi r30, 0\n ldi r31, 1\n ldi r18, 1", "st Z+, r1\n cpi r30, 20\n cpc r31, r18\n brne 3b"),
-        Some(10 + 3 + 20 * 6 - 1)
-    );
-    assert_eq!(cycles("ldi r24, 100\n ldi r25, 25", "sub r24, r25\n brne 3b"), Some(10 + 2 + 4 * 3 - 1));
-    // A turn may go round something else, and what is called leaves the counter alone.
-    assert_eq!(cycles("ldi r24, 8", "sbrc r2, 0\n nop\n dec r24\n brne 3b"), Some(10 + 1 + 8 * 5 - 1));
-    // Loops within loops.
-    assert_eq!(
-        cycles("ldi r25, 3", "ldi r24, 8\n4: dec r24\n brne 4b\n dec r25\n brne 3b"),
-        Some(10 + 1 + 3 * (1 + 8 * 3 - 1 + 3) - 1)
-    );
-}
-
-#[test]
-fn a_loop_whose_counter_is_not_followed_to_its_end_has_no_bound() {
-    let refused = |set: &str, turn: &str| {
-        let program = format!("start:\n clr r1\n1: wdr\n rcall waits\n rjmp 1b\nwaits:\n {set}\n3: {turn}\n ret");
-        let turn = proved(&program).turn.expect("the watchdog is fed");
-        assert_eq!(turn.cycles, None, "{set} {turn:?}");
-        assert!(!turn.without_bound.is_empty());
-    };
-    refused("lds r24, 0x0100", "dec r24\n brne 3b");
-    // A turn can go round the counting, or count again; memory decides; it never comes to its end.
-    refused("ldi r24, 8", "sbrc r2, 0\n dec r24\n cpi r24, 0\n brne 3b");
-    refused("ldi r24, 8", "sbrc r2, 0\n ldi r24, 8\n dec r24\n brne 3b");
-    refused("ldi r24, 8", "lds r24, 0x0100\n dec r24\n brne 3b");
-    refused("ldi r24, 7", "subi r24, 2\n brne 3b");
-    refused("ldi r24, 8", "rcall clobbers\n dec r24\n brne 3b\n ret\nclobbers:\n lds r24, 0x0100");
 }
 
 #[test]
@@ -673,4 +277,36 @@ fn control_characters_of_a_file_are_not_printed_as_such() {
         let error = Budgets::read(file.path()).expect_err("it is no number").to_string();
         assert!(error.contains(says) && !error.contains('\u{1b}'), "{error}");
     }
+}
+
+#[test]
+fn a_call_by_a_slot_of_a_virtual_table_is_followed_past_the_slots_that_were_loaded_before_it() {
+    let called = |loads: &str| {
+        let bounds = proved(&format!(
+            "start:\n clr r1\n ldi r16, 0x08\n out 0x3e, r16\n ldi r16, 0xff\n out 0x3d, r16\n lds r26, obj\n lds r27, obj+1\n ld r18, X+\n ld r19, X\n movw r26, r18\n {loads}\n icall\n1: rjmp 1b\n\
+             first:\n ret\nsecond:\n push r2\n push r3\n pop r3\n pop r2\n ret\n\
+             .data\n.type _ZTV1A, @object\n_ZTV1A: .word 0, 0, gs(first), gs(second)\n.size _ZTV1A, . - _ZTV1A\n\
+             obj: .word it\nit: .word _ZTV1A + 4"
+        ));
+        let all = bounds.indirect.iter().flat_map(|call| &call.targets);
+        let names = all.map(|target| target.split(' ').nth(1).expect("it has a name").to_owned());
+        (names.collect::<Vec<_>>(), bounds.stack_bytes)
+    };
+    assert_eq!(called("ld r30, X+\n ld r31, X"), (vec!["first".to_owned()], 2));
+    assert_eq!(called("ld r24, X+\n ld r25, X+\n ld r30, X+\n ld r31, X"), (vec!["second".to_owned()], 2 + 2));
+    assert_eq!(called("ld r24, X+\n ld r25, X+\n ld r31, -X\n ld r30, -X"), (vec!["first".to_owned()], 2));
+    // In front of the table, and two bytes that are not side by side.
+    assert_eq!(called("ld r31, -X\n ld r30, -X").0, ["first", "second"]);
+    assert_eq!(called("ld r30, X\n ld r31, X").0, ["first", "second"]);
+}
+
+#[test]
+fn calls_within_calls_are_followed_to_a_depth_that_the_host_has_room_for() {
+    let chain = |length: usize| -> String {
+        let functions = (1..length).map(|number| format!("f{number}:\n rcall f{}\n ret\n", number + 1));
+        format!("start:\n rcall f1\n rjmp start\n{}f{length}:\n ret", functions.collect::<String>())
+    };
+    assert_eq!(proved(&chain(199)).stack_bytes, 2 * 199);
+    assert_refused(&chain(200), "200 functions call each other on the way to f200");
+    assert_refused(&chain(2500), "call fewer within each other");
 }
