@@ -59,9 +59,8 @@ const INTERRUPT_ENTRY_CYCLES = 2;
 /** Cycles that an interrupt takes more if it ends a sleep (data sheet, 7.7.1). */
 const WAKE_UP_CYCLES = 4;
 
-/** Instructions after which one more is executed before an interrupt (data sheet, 7.7). */
+/** One more instruction is executed before an interrupt after `reti`, and after any that sets I (data sheet, 7.7). */
 const RETI = 0x9518;
-const SEI = 0x9478;
 const SLEEP = 0x9588;
 
 /** The cycle of a peripheral's next event, from the CPU's private list. */
@@ -128,9 +127,10 @@ export class Chip {
         while (cpu.cycles < this.#until) {
             if (this.#isAsleep) this.#skipToEvent();
             else {
+                const wasEnabled = cpu.interruptsEnabled;
                 let instruction = program[cpu.pc];
                 avrInstruction(cpu);
-                if (instruction === RETI || instruction === SEI) {
+                if (instruction === RETI || (!wasEnabled && cpu.interruptsEnabled)) {
                     instruction = program[cpu.pc];
                     avrInstruction(cpu);
                 }
