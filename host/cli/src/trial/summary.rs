@@ -78,26 +78,24 @@ pub(super) fn about(study: &Study) -> String {
     )
 }
 
-/// How many plants a controller damaged, and the speed with the highest share.
+/// How many plants a controller damaged, and of several speeds the one with the highest share.
 fn damage(totals: &[Total], controller: Treatment) -> String {
     let name = controller.title();
     let (damaged, plants) = of(totals, controller).fold((0, 0), |(damaged, plants), total| {
         (damaged + total.plots.effect.injured(), plants + total.plots.effect.plants)
     });
+    if plants == 0 {
+        return format!("Plants damaged by {name}: unknown, because no plant stands in the rows.");
+    }
     let share = Share::of(damaged, plants);
-    let kind = share.kind();
+    let count = if damaged == 0 { "none".to_owned() } else { damaged.to_string() };
+    let mut said = format!("Plants damaged by {name}: {count} of {plants} ({share} %, {}).", share.kind());
     let percent = |total: &&Total| total.damage().percent();
     let worst = of(totals, controller).max_by(|a, b| percent(a).partial_cmp(&percent(b)).unwrap_or(Equal));
-    match worst {
-        _ if plants == 0 => format!("Plants damaged by {name}: unknown, because no plant stands in the rows."),
-        Some(worst) if damaged > 0 => {
-            let (speed_km_h, most) = (worst.speed_km_h(), worst.damage().shown());
-            format!(
-                "Plants damaged by {name}: {damaged} of {plants} ({share} %, {kind}). The share is highest at {speed_km_h} km/h: {most} %."
-            )
-        }
-        _ => format!("Plants damaged by {name}: none of {plants} ({share} %, {kind})."),
+    if let Some(worst) = worst.filter(|_| damaged > 0 && of(totals, controller).count() > 1) {
+        said += &format!(" The share is highest at {} km/h: {} %.", worst.speed_km_h(), worst.damage().shown());
     }
+    said
 }
 
 /// The differences between the paper's controller here and in the paper, at the paper's speeds, and their reason.

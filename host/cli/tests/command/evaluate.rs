@@ -134,7 +134,7 @@ fn a_trial_without_damage_or_replications_is_evaluated_partly() {
     );
     let said = said(folder.path(), &["evaluate", "trial.csv"]);
     for line in [
-        "None of 220 plants was damaged: below 1.35 % (one-sided 95 % bound).",
+        "None of 220 plants was damaged: below 1.36 % (one-sided 95 % bound).",
         "Plant damage has no model: it is 0 in every plot",
         "No analysis of variance: it is 0 in every plot",
         "No analysis of variance: plots: 4, parameters: 3: this model takes at least 6 plots.",
