@@ -7,6 +7,7 @@
 //! Only writes that erase first are timed (EEPM 00). The core is not halted for the few cycles after a command.
 
 use super::chip::{Chip, Writer};
+use crate::memory::EEPROM_BYTES;
 use crate::pins::CYCLES_PER_SECOND;
 use simavr_ffi as simavr;
 use std::ffi::c_void;
@@ -77,8 +78,8 @@ pub(super) unsafe extern "C" fn on_control_write(
         let writer = (*eeprom).writer;
         writer.write(chip, register, value);
         if writes {
-            let address = u16::from_le_bytes([chip.read(EEARL), chip.read(EEARH)]);
-            (*eeprom).write = Some(Write { address: address.into(), begun: chip.cycle() });
+            let address = usize::from(u16::from_le_bytes([chip.read(EEARL), chip.read(EEARH)])) % EEPROM_BYTES;
+            (*eeprom).write = Some(Write { address, begun: chip.cycle() });
             chip.set(register, chip.read(register) | EEPE);
             simavr::avr_cycle_timer_register(avr, WRITE_CYCLES, Some(on_written), parameter);
         }
