@@ -74,7 +74,8 @@ const ROUNDS: u8 = 6;
 
 /// Time for a swing, several times as long as any servo needs. It is no multiple of the servo's frame (20 ms), so the six swings in
 /// meet its start at different moments, and one of them hardly waits for the next pulse.
-const SWING: u16 = Coarse::steps_in_ms(1503);
+pub const SWING_MS: u16 = 1503;
+const SWING: u16 = Coarse::steps_in_ms(SWING_MS);
 
 /// Longest wait of a command besides the servo's gap: the longest pulse on the line, and some turns of the loop.
 const SPARE_MS: u8 = 7;

@@ -22,7 +22,7 @@ The status is 0 if every bound is within its budget, and 1 if one is not. It is 
 Reasons are recursion, calls to unknown addresses, handlers that enable interrupts, functions that
 break the calling convention, and loops without a bound where time needs one.")]
 pub struct Arguments {
-    /// Analyse this ELF instead of this weeder's own firmware.
+    /// Analyse this ELF instead of this weeder's own firmware. Name its --budgets too if it is another program.
     #[arg(long, value_name = "FILE.elf")]
     elf: Option<PathBuf>,
     #[command(flatten)]

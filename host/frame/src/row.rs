@@ -38,7 +38,7 @@ pub struct Arguments {
     /// Write tables (CSV), a picture and an animation of the row into this folder, and create it if needed.
     #[arg(long, value_name = "FOLDER")]
     out: Option<OutName>,
-    /// Write the levels on the virtual Uno's pins, for PulseView or GTKWave.
+    /// Write the levels on the virtual Uno's pins, for GTKWave, or for PulseView with downsampling factor 625.
     #[arg(long, value_name = "FILE.vcd")]
     vcd: Option<OutName>,
     #[command(flatten)]

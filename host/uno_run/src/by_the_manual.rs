@@ -6,7 +6,7 @@
 //! Without its measurements the margin is not changed.
 
 use anyhow::Result;
-use control::operate::calibration::{Outcome, SwingTimes, Swings};
+use control::operate::calibration::{Outcome, SWING_MS, SwingTimes, Swings};
 use control::settings::{Setting, Settings};
 use control::units::{Instant, Interval};
 use field::conditions::Arm;
@@ -24,9 +24,6 @@ use uno::{CYCLES_PER_SECOND, Pulse};
 /// Times that the manual has the servo timed and the wheel measured.
 const TIMINGS: u64 = 2;
 const STRETCHES: u64 = 3;
-
-/// Time between two swings of the firmware's measurement of the servo, in milliseconds.
-const SWING_MS: u32 = 1500;
 
 /// Speed at which stretches and rows are rolled along.
 const SPEED_KM_H: f64 = 2.5;
@@ -127,18 +124,19 @@ impl Novice {
         let servo = self.conditions.machine(self.chance(timing).random()).servo;
         let cycle = |milliseconds: u32| u64::from(milliseconds) * (CYCLES_PER_SECOND / 1000);
         let pulse = |rise: u64, width_us: f64| Pulse { rise, fall: rise + cycle(1) * width_us as u64 / 1000 };
+        let swing_ms = u32::from(SWING_MS);
         // The tool is out before the first swing, so that swing leads in.
         let swings = (0..12).map(|swing| {
             let width_us = if swing % 2 == 0 { servo.in_us } else { servo.out_us };
-            pulse(cycle(SWING_MS * (swing + 1)), width_us)
+            pulse(cycle(swing_ms * (swing + 1)), width_us)
         });
         let pulses: Vec<Pulse> = [pulse(0, servo.out_us)].into_iter().chain(swings).collect();
         let stroke = servo.stroke(&servo.commands(&pulses), 0);
         let out_degrees = servo.stroke_degrees() - self.conditions.machine(0).clear_within_degrees;
         let now = |milliseconds: u32| Instant::new(0) + Interval::from_ms(milliseconds);
         let gap_ms = self.settings().get(Setting::ServoGapMs) as u8;
-        let mut decided = Swings::new(now(SWING_MS), true, gap_ms);
-        let outcome = (SWING_MS..).find_map(|milliseconds| {
+        let mut decided = Swings::new(now(swing_ms), true, gap_ms);
+        let outcome = (swing_ms..).find_map(|milliseconds| {
             let is_out = stroke.degrees(f64::from(milliseconds) / 1000.0) >= out_degrees;
             decided.step(now(milliseconds), is_out)
         });

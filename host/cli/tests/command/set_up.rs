@@ -156,10 +156,10 @@ fn the_steps_in_their_order_end_at_the_machine_that_is_set_up() {
             "{setting:?}"
         );
     }
-    // Two timings of the servo differ by some milliseconds: its swings scatter by 15.
+    // Two measurements of the servo differ by some milliseconds.
     for setting in [Setting::LeadOutMs, Setting::LeadInMs] {
         let (timed, of_the_field) = (novice.settings().get(setting), set_up.settings[&name(setting)]);
-        assert!(timed.abs_diff(of_the_field) <= 8, "{setting:?}: {timed} and {of_the_field}");
+        assert!(timed.abs_diff(of_the_field) <= 5, "{setting:?}: {timed} and {of_the_field}");
     }
     // The page's Try and the manual name the same margin.
     let margin_mm = novice.settings().get(Setting::MarginMm);

@@ -290,9 +290,10 @@ fn the_result_in_the_readme_is_that_of_the_figures() {
     };
     let ((damaged, interval), (damaged_there, _)) = (split(damaged), split(damaged_there));
     let (lowest, highest) = published::DAMAGED_PERCENT;
+    let kind = if interval.contains(" to ") { "two-sided 95 % interval" } else { "one-sided 95 % bound" };
     let sentence = format!(
         "In simulated rows at 2.5 km/h, this firmware weeded {weeded} % of the row's ground. Of the plants that its beam sees, it \
-         damaged {damaged} %\n({interval} %, a one-sided 95 % bound). The paper's program on the same machine weeded {weeded_there} % and \
+         damaged {damaged} %\n({interval} %, a {kind}). The paper's program on the same machine weeded {weeded_there} % and \
          damaged {damaged_there} %. On its own machine\nthe paper measured {lowest} to {highest} %. `{command}` prints these figures.\n"
     );
     let page = expect_file!["../../../../README.md"];
