@@ -190,8 +190,9 @@ impl ResponseAnalysis {
             Response::PlantDamage => "that a plant is damaged",
             _ => "that a weed is gone",
         };
+        let [ratio, least, greatest] = [odds_ratio, least, greatest].map(|&odds| times(odds, 2));
         Some(format!(
-            "Counted, the odds {what} are {odds_ratio:.2} times as high for each km/h more ({least:.2} to {greatest:.2}; {}).",
+            "Counted, the odds {what} are {ratio} times as high for each km/h more ({least} to {greatest}; {}).",
             probability(*p)
         ))
     }
