@@ -99,7 +99,7 @@ pub fn prove(elf: &Program, budgets: &Budgets) -> Result<Bounds, BoundsError> {
             let names = names.into_iter().map(String::as_str).collect::<Vec<_>>().join(" or ");
             return Err(BoundsError(format!(
                 "no function of the program is called {names}, which the budgets name in [{table}]: take the names that \
-                 `avr-objdump -dC` shows"
+                 `avr-objdump -dC` shows, or name the budgets of this program"
             )));
         }
     }

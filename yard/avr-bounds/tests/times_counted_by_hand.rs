@@ -233,6 +233,7 @@ fn a_bound_for_a_missing_function_is_refused() {
     let loops = LoopBounds::from([("gone".to_owned(), bound)]);
     let error = try_to_prove_with("start: rjmp start", None, &loops).expect_err("it has no such function").to_string();
     assert!(error.contains("no function of the program is called gone"), "{error}");
+    assert!(error.ends_with("or name the budgets of this program"), "{error}");
 }
 
 #[test]
