@@ -3,8 +3,8 @@
 //! Each chip has one row. Memories, vectors and register addresses come from the device's header in avr-libc
 //! (`FLASHEND`, `RAMEND`, `_VECTORS_SIZE`, `EECR`, `GPIOR0`). A test compares them with this table. The cycles of calls
 //! and of the interrupt response come from the data sheets: the instruction set summary, and section "Interrupt
-//! Response Time". Some sheets of chips with return addresses of 2 bytes
-//! state five cycles, and describe 3 bytes; the 2 bytes are counted here.
+//! Response Time". For some chips with return addresses of 2 bytes that section describes 3 bytes, and states five
+//! cycles. The 2 bytes are counted here.
 
 use crate::decode::Instruction;
 use crate::decode::Operation::{self, *};
