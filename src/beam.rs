@@ -1,14 +1,28 @@
 //! The beam across the row on D8, and a second one on D10: each edge with the encoder's position at that moment.
 //!
-//! The pin-change interrupt PCINT0 stamps an edge and queues it; the loop takes it. A full queue drops the edge and reports that.
-//! This file does not interpret edges, or tell which beam one belongs to: a stamp has both levels. Low is broken. Apart from
-//! main.rs, this is the only file that uses another peripheral's data: the handler stamps the encoder's count.
+//! # How it works
 //!
-//! A stamp has the lower 14 bits of the count, and one bit for each level. The loop restores the upper bits from the present count.
-//! This works until the wheel has turned by 8192 ticks, half the range of 14 bits: 1.5 s at 10 km/h. A stopped loop is reset after
-//! a quarter of a second.
+//! A beam's edge calls the handler of the pin-change interrupt PCINT0. The handler stamps the edge and queues it; the
+//! loop takes it. If the queue is full, the handler drops the edge and reports that.
 //!
-//! Without a second beam D10 may be open: its interrupt is then off, and its level is ignored.
+//! A stamp has the lower 14 bits of the encoder's count, and one bit for each beam's level. Low is broken. The loop
+//! restores the upper bits from the present count.
+//!
+//! Apart from main.rs, this is the only file that uses another peripheral's data: the encoder's count.
+//!
+//! D10 may be open if there is no second beam. The loop then turns its interrupt off, and the controller ignores its
+//! level.
+//!
+//! # Limits
+//!
+//! - This file does not interpret edges. It does not tell which beam an edge belongs to: a stamp has both levels.
+//! - The loop can restore a count until the wheel has turned by 8192 ticks. That is half the range of 14 bits. With the
+//!   default wheel it takes 1.5 s at 10 km/h. The watchdog resets a stopped loop after a quarter of a second.
+//! - The handler stamps the count when it runs, not when the edge comes. `weeder bounds` proves the longest wait
+//!   (vector 3).
+//! - A torn wire looks like bare ground. Only an optocoupler or a second beam shows it (docs/safety.md).
+//! - The queue's length assumes a sensor with a response of 1 ms, and turns as short as simulated. No real board has
+//!   shown either.
 
 use crate::{
     encoder,

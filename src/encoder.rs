@@ -1,13 +1,32 @@
 //! The wheel encoder on D2 and D3: four counts a cycle, signed, 32 bits.
 //!
-//! INT0 and INT1 (data sheet, 13.2.1) share one handler, which samples both levels at once. The time between two samples limits the
-//! wheel's speed: two edges between samples are resolved by the last direction, three are not. No interrupt has a higher priority
-//! than these two. PCINT2 would serve both pins, but the beam's PCINT0 has a higher priority than it: a sample could then wait for
-//! a handler that has just begun and for the beam's. Now it waits for one of them only.
+//! # How it works
 //!
-//! The handler is in assembly. It looks up the step in a table and counts it. It handles the count's upper bytes only if they
-//! change. The compiler makes the table from the decoder of `control`, for each state and each pair of levels. So there is no
+//! The channels request INT0 and INT1 (data sheet, 13.2.1). Both interrupts share one handler, which samples both
+//! levels at once. It looks up the step in a table and counts it. It handles the count's upper bytes only if they
+//! change.
+//!
+//! The compiler makes the table from the decoder of `control`, for each state and each pair of levels. So there is no
 //! second decoder that could differ.
+//!
+//! The time between two samples limits the wheel's speed. The last direction resolves two edges between samples, but
+//! not three. So the handler is in assembly.
+//!
+//! No interrupt has a higher priority than INT0 and INT1. So a sample waits for one other handler only. PCINT2 would
+//! serve both pins, but the beam's PCINT0 has a higher priority. A sample could then wait for a handler that has just
+//! begun, and for the beam's handler too.
+//!
+//! # Limits
+//!
+//! - Three edges between two samples make the count wrong. `weeder bounds` proves up to which rate this never happens.
+//!   At that rate the edges leave the loop no time. So the loop's need of time is the real limit.
+//! - Two edges between samples count in the last direction. This is wrong if the wheel reversed within them. Before the
+//!   first step there is no direction, and the handler counts them as lost.
+//! - Noise on both channels looks like two edges. The handler has no time to tell them apart. Below 20,000 ticks a
+//!   second the `Odometer` of `control` removes these ticks.
+//! - The handler clears both requests, and then samples. It relies on the chip: a level passes the synchroniser one
+//!   cycle before its request. The virtual Uno has no synchroniser, and no real board has shown this.
+//! - No real board has shown the proved rate.
 
 use crate::{handler::handler, shared::Shared};
 use avr_device::{

@@ -1,4 +1,25 @@
 //! Examples in flash: the built-in ones, and tables of the benchmark.
+//!
+//! # How it works
+//!
+//! The compiler turns each example into a row of six bytes: five features, then the label. The rows stay in flash, and
+//! [`InFlash`] reads them there.
+//!
+//! A search compares a detection with each row. Its reach is the distance of the farthest neighbour that it keeps so
+//! far. `neighbour` subtracts the squared difference of each feature from the reach. A borrow shows that the row is
+//! beyond the reach. The search then goes on to the next row.
+//!
+//! `neighbour` is in assembly. The benchmark compares its results on the built-in examples with the plain search of
+//! `knn`.
+//!
+//! # Limits
+//!
+//! - A table has at most 254 examples, because a byte counts the rows and one more.
+//! - The assembly takes exactly five features.
+//! - This file does not hold the examples that the operator teaches. They are in the EEPROM.
+//! - The built-in examples come from simulated rows (`weeder train --synthetic`). They know plants from 100 to 180 mm
+//!   and weeds up to 20 mm (docs/training.md). No real row has shown that they fit a crop.
+//! - The simulator simavr counts the cycles of a search. No real board has shown them.
 
 use avr_progmem::{raw::read_byte, wrapper::ProgMem};
 use control::ground::{examples, features};

@@ -1,13 +1,34 @@
 //! The entry, exit and register use that all interrupt handlers share.
 //!
-//! The handlers are in assembly because the encoder waits for each of them. The longest handler and the longest critical section
-//! limit the wheel's speed (see `encoder`). No handler turns interrupts on, so only one runs at a time and all share the same save
-//! locations: SREG in GPIOR0, r24 in GPIOR2. Each takes one cycle to save and one to restore; the stack takes two. GPIOR1 is the
-//! encoder's. Bit 7 of GPIOR0 tells the loop whether a handler has run (`idle`). A handler that needs a pointer pushes Z itself. No
-//! handler uses any other register, not even r1, which need not be 0 here.
+//! # How it works
 //!
-//! A handler's budget runs from the interrupt's response to the end of `reti`. Four cycles are the response, four
-//! more after sleep, two the vector's jump, and ten this file's. `shared` and `ring` hold the data that handlers share with the loop.
+//! The encoder waits for each handler. So the longest handler and the longest critical section limit the wheel's speed
+//! (see `encoder`). This is why the handlers are in assembly.
+//!
+//! No handler turns interrupts on. So only one runs at a time, and all share the same save locations: SREG in GPIOR0,
+//! r24 in GPIOR2. A save there takes one cycle, and a restore one. On the stack each takes two. A handler that needs a
+//! pointer pushes Z itself. No handler uses any other register, not even r1, which need not be 0 here.
+//!
+//! The encoder keeps its state in GPIOR1. Bit 7 of GPIOR0 tells the loop whether a handler has run (`idle`). `shared`
+//! and `ring` hold the data that handlers share with the loop.
+//!
+//! A handler's budget (`handler_cycles` in budgets.toml) runs from the interrupt's response to the end of `reti`. Every
+//! handler spends these cycles of it:
+//!
+//! | part | cycles |
+//! | --- | ---: |
+//! | response of the chip | 4 |
+//! | wake-up, only after sleep | 4 |
+//! | jump in the vector table | 2 |
+//! | save and restore of r24 and SREG, in this file | 6 |
+//! | `reti`, in this file | 4 |
+//! | sum | 20, without sleep 16 |
+//!
+//! # Limits
+//!
+//! - A handler that turns interrupts on could lose the saved SREG and r24 to the next handler. `weeder bounds` refuses
+//!   such a program.
+//! - `weeder bounds` proves the cycles from the ELF, and the virtual Uno measures them. No real board has shown them.
 
 /// Defines the handler of an interrupt vector from the vector's symbol, its assembly and the operands. The handler may use r24 and
 /// the flags. It returns after the last line. Rarely used lines go `aside`, after the return, and jump back.

@@ -1,14 +1,27 @@
-//! The second beam: it sees each detection after the first beam does. This measures the wheel's slip, and shows when a beam is
-//! blind.
+//! The second beam: it measures the wheel's slip, and shows when a beam is blind.
 //!
-//! The wheel's travel between the two detections, compared with the beams' distance, gives the slip ([`Slip`]). Each detection of
-//! the second beam is paired with one of the first: as wide, and near enough for any slip. If two fit, nothing is measured; this
-//! happens in a dense stand. A detection that one beam missed, or that may be two plants, ends the run of agreeing ones.
+//! # How it works
 //!
-//! While the slip is known, the second beam expects each detection of the first. Any other detection closes the ground from its
-//! edge on, and is classified like one of the first beam. If one beam misses three detections in a row, it is blind.
+//! The second beam sees each detection after the first beam does. [`SecondBeam`] pairs each detection of the second
+//! beam with one of the first: as wide, and near enough for any slip.
 //!
-//! What it does not do: measure slip on empty ground, or see plants that are nearer to the tool than the second beam.
+//! It compares the wheel's travel between the two detections with the beams' distance. This gives the slip ([`Slip`]),
+//! which is known once consecutive pairs agree. A detection that one beam missed, or that may be two plants, ends the
+//! run of agreeing pairs.
+//!
+//! While the slip is known, the second beam expects each detection of the first. Any other detection closes the ground
+//! from its edge on. The classifier then treats it like a detection of the first beam.
+//!
+//! If one beam misses three detections in a row, it is blind.
+//!
+//! # Limits
+//!
+//! - The second beam measures no slip on empty ground. It does not see plants between itself and the tool.
+//! - If two detections fit, [`SecondBeam`] measures nothing. This happens in a dense stand. With more than five
+//!   detections between the beams, it measures nothing until these have passed.
+//! - It measures no slip beyond 30 %. It ignores detections so narrow that a beam may miss them.
+//! - All tests simulate the beams. No real machine has shown that both see the same width of a canopy, or that
+//!   consecutive slips agree.
 
 use super::{
     detection::Detection,

@@ -1,12 +1,30 @@
 //! Monitors of encoder and beam: they find a failed sensor.
 //!
-//! A failed sensor shows in how the readings fit together. A rolling machine makes progress, so encoder edges without progress come
-//! from a single working channel. Plants that pass a standing machine come from a dead encoder. A machine has mass, so an encoder
-//! that falls silent without slowing down has failed. If it is as fast after a gap as before, ticks are lost. A canopy has a
-//! limited number of leaves, so a flickering beam sees dust. The monitors count; the [`weeder`](crate::weeder) decides what a fault
-//! means for the tool.
+//! # How it works
 //!
-//! Small losses add up over a distance. [`EncoderMonitor`] compares them with the position error that the tool may have.
+//! A failed sensor shows in how the readings fit together:
+//!
+//! | the monitor sees | fault | reason |
+//! | --- | --- | --- |
+//! | encoder edges without progress | only one channel works | a rolling machine makes progress |
+//! | plants that pass a standing machine | the encoder is dead | wind moves leaves, but no plant passes |
+//! | an encoder that falls silent without slowing down | the encoder has failed | a machine has mass |
+//! | a gap, and the same speed after it as before | ticks are lost | the machine was not slow in between |
+//! | a beam that flickers | dust | a canopy has a limited number of leaves |
+//!
+//! The monitors count. The [`weeder`](crate::weeder) decides what a fault means for the tool. Small losses add up over
+//! a distance. [`EncoderMonitor`] compares them with the position error that the tool may have.
+//!
+//! # Limits
+//!
+//! - The monitor finds silences only from a speed on: 0.5 km/h with ticks of 0.5 mm (`STEADY`). Below that, a silence
+//!   looks like a stop.
+//! - A stop harder than 3.3 m/s2 at the wheel may look like a silence (`BRAKES`). With the least favourable of the
+//!   finer encoders, the limit is 2.6 m/s2. The weeder then forgets the ground up to the beam, and raises no alarm.
+//! - Very even losses stay unnoticed: a wheel that slips, or an encoder that always misses about five ticks or fewer at
+//!   a time. The same holds for an encoder so fine that the loop does not see its single ticks (docs/faults.md).
+//! - The constants assume that an engine vibrates with 50 Hz, and that a person brakes with at most 3 m/s2. They assume
+//!   that sun breaks the beam for 30 ms at most. No real machine has shown any of this.
 
 use crate::{
     alarm::Alarm,
@@ -37,22 +55,33 @@ type Short = u8;
 /// tool that is out stays out.
 const QUIET: Short = (crate::measure::speed::SPACING >> 2) as Short;
 
-/// Longest time of a progress in steady rolling, 15.4 ms: 0.5 km/h with ticks of 0.5 mm or finer. A coarser encoder needs four
-/// ticks in this time; slower, its silences cannot be found.
+/// Longest time of a progress in steady rolling, 15.4 ms. With ticks of 0.5 mm this is 0.5 km/h, and with finer ticks
+/// at most 0.8 km/h. A coarser encoder needs four ticks in this time.
 ///
-/// At less speed a silence looks like a stop, because the machine stops within a progress.
+/// The monitor cannot find the silences of a slower machine. At less speed the machine stops within a progress, so a
+/// silence looks like a stop.
 const STEADY: Short = 59;
 
-/// Tells steady rolling from braking, 15.6 ms. A braking machine takes longer for each progress than for the one before. So rolling
-/// is steady only if twice the last progress is at most this much above the one before.
+/// Tells steady rolling from braking, 15.6 ms. A braking machine takes longer for each progress than for the one
+/// before. So rolling is steady only if twice the last progress is at most this much above the one before.
 ///
-/// Braking with 3.3 m/s2 (3 on the ground, a tenth for wheel slip) exceeds this in the last progress but one. With `x` progresses
-/// left and ticks of 0.5 mm, a progress takes `sqrt(x + 1) - sqrt(x)` times 35.6 ms; `x` below 1 gives 18.2 ms. From `x` = 1 on
-/// another progress follows, within 2.42 times this one: `sqrt(x) - sqrt(x - 1)` is at most 2.42 times `sqrt(x + 1) - sqrt(x)`.
+/// A machine that brakes with 3.3 m/s2 must not look silent: 3 on the ground, and a tenth for the wheel's slip. With
+/// ticks of 0.52 mm a progress is 2.09 mm. The last 2.09 mm before the stop then take 35.6 ms, in seconds
+/// `sqrt(2 * 2.09 / 3300)`.
+///
+/// The machine stops `x` progresses after the last complete one. That one took `sqrt(x + 1) - sqrt(x)` times 35.6 ms.
+///
+/// | `x` | the encoder | so |
+/// | --- | --- | --- |
+/// | below 1 | twice the last progress is 18.2 ms or more above the one before | rolling is not steady |
+/// | from 1 on | another progress follows, within 2.42 times the last one | `is_silence` is false: it asks for 2.5 times |
+///
+/// The second row holds because `sqrt(x) - sqrt(x - 1)` is at most 2.42 times `sqrt(x + 1) - sqrt(x)`.
 const BRAKES: Short = 61;
 
-/// Slower than four ticks in this time, 32.8 ms, a wheel may tremble while it rolls: below 0.5 km/h with the coarsest encoder
-/// ([`TICKS_PER_M_LEAST`](crate::settings::TICKS_PER_M_LEAST)).
+/// A wheel that takes longer for four ticks, 32.8 ms, may tremble while it rolls. The coarsest encoder
+/// ([`TICKS_PER_M_LEAST`](crate::settings::TICKS_PER_M_LEAST)) has ticks of 1.1 mm. Its wheel then rolls slower than
+/// 0.5 km/h.
 const SLOW: Short = 128;
 
 /// Error of a time from the turns of the loop at its ends: 1 ms, or a turn and a step if that is longer.

@@ -1,15 +1,29 @@
 //! All texts, packed into one table in flash.
 //!
-//! An AVR keeps Rust's string literals in SRAM, which has 2 KiB. So the table is in flash, and a [`Text`] is a place in it. `texts`
-//! lists the texts in groups. The table has an index of the groups; in a group, a text is found by the lengths of those before it. A
-//! text with words is several texts here: its parts before, between and behind the words.
-//!
 //! # How it works
 //!
-//! A byte of a packed text is a code. The first codes are the characters that occur in texts. Each further code is a fragment: a
-//! pair of earlier codes. The compiler finds the fragments: it gives the most frequent pair a code, replaces the pair by this code
-//! everywhere, and repeats this while codes are free (`PACKED`). So unpacking needs no search. [`Characters`] splits a code until
-//! its first half is a character. The second halves wait on a small stack.
+//! An AVR keeps Rust's string literals in SRAM, which has 2 KiB. So the table is in flash, and a [`Text`] is a place in
+//! it. `texts` lists the texts in groups, and the table has an index of the groups. In a group, [`Text`] finds a text
+//! by the lengths of the texts before it. A text with words is several texts here: its parts before, between and behind
+//! the words.
+//!
+//! A byte of a packed text is a code. The first codes are the characters that occur in texts. Each further code is a
+//! fragment: a pair of earlier codes. The compiler finds the fragments (`PACKED`):
+//!
+//! 1. It gives the most frequent pair a code.
+//! 2. It replaces the pair by this code everywhere.
+//! 3. It repeats this while codes are free, and a fragment saves more bytes than it takes.
+//!
+//! So unpacking needs no search. [`Characters`] splits a code until its first half is a character. The second halves
+//! wait on a small stack. `HALVINGS` limits the steps of a code, and `WAITING` the stack.
+//!
+//! # Limits
+//!
+//! - The compiler refuses a text that is not ASCII. It refuses a part of a text with more than 63 codes.
+//! - All texts together have at most 16,000 characters and ends (`LONGEST`).
+//! - No fragment comes from the version. So all else is the same for each commit.
+//! - Nothing proves that these fragments give the smallest table. A test holds that packing saves at least a third.
+//! - Two simulators have printed the console's answers. No real board has.
 
 use crate::say::texts::{GROUPS, UNPACKED};
 
