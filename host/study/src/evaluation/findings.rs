@@ -1,5 +1,6 @@
 //! A trial's findings, in sentences.
 
+use super::report::times;
 use super::table::LEAVE_OUT;
 use super::{Analysis, PlotRecord, Response, ResponseAnalysis, Treatment, nominal};
 use crate::statistics::{OddsTerm, SIGNIFICANCE, Share, Term, grouped, probability};
