@@ -145,7 +145,7 @@ fn leads_near_each_other_give_one_swing_each_way_a_zone_at_every_speed() {
                  roll {} mm at {mm_s} mm/s",
                 mm_s * 2 + 2500
             );
-            go(&run(&[(450, 150), (700, 150), (60, 90)], &lines)).steady_swings
+            go(&run(&[(450, 150), (700, 150), (60, 90)], &lines)).steady_swings()
         });
         swings.sum()
     };

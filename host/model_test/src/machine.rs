@@ -7,7 +7,7 @@ use control::{
     ground::class::Listed,
     measure::reset::Cause,
     operate::{state::State, tool::Reason},
-    settings::Settings,
+    settings::{Setting, Settings},
 };
 use proptest::test_runner::TestCaseError;
 
@@ -101,6 +101,11 @@ pub trait Machine: Sized {
 
     /// The settings in use.
     fn settings(&self) -> &Settings;
+
+    /// A length among the settings in use, in ticks.
+    fn ticks(&self, setting: Setting) -> i64 {
+        self.settings().ticks(setting).0.into()
+    }
 
     /// Whether the settings in use may differ from [`settings`](Self::settings), until `get` is typed.
     fn settings_are_in_doubt(&self) -> bool;

@@ -6,8 +6,8 @@
 //! was classified as a weed, and the command `start now`. The command opens only ground that `status` reports as
 //! unknown, because it was never seen or was forgotten. An alarm opens nothing.
 //!
-//! With a stem zone, the tool may work at either end of a detection: beyond the zone, but by at most a fifth of that
-//! part. A second beam can only add to a detection.
+//! With a stem zone, the tool may work at either end of a wider detection: on half of the excess, but on at most 11/64 of
+//! the zone's width. A second beam can only add to a detection.
 //!
 //! Guarded ground is closed like a canopy from then on, with or without a plant.
 //!
@@ -123,8 +123,9 @@ impl Model {
         self.is_shifted || self.may_have_forgotten
     }
 
-    /// Adds an error, in ticks, to every position of the machine.
+    /// The encoder's count goes wrong. Adds an error, in ticks, to every position of the machine.
     pub fn loosen(&mut self, ticks: i64) {
+        self.is_shifted = true;
         self.slack += ticks;
     }
 

@@ -43,9 +43,10 @@ pub struct Beginning {
 }
 
 /// The encoder's health.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Encoder {
     /// It counts.
+    #[default]
     Works,
     /// It counts nothing.
     Silent,

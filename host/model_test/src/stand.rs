@@ -104,7 +104,7 @@ impl Stand {
 
     /// Follows the tool's orders. Returns whether the tool is clear of the row. An order to leave may be `lateness_us` old when it
     /// is seen.
-    pub fn is_clear(&mut self, out: bool, now_us: u64, lateness_us: u64, geometry: &Geometry) -> bool {
+    pub fn follow(&mut self, out: bool, now_us: u64, lateness_us: u64, geometry: &Geometry) -> bool {
         let age_us = now_us - self.ordered_us;
         let clear = if self.in_row {
             !self.was_in_row && age_us < geometry.dead_us

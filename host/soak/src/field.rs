@@ -296,7 +296,7 @@ impl<M: Machine> Field<M> {
     /// Executes a step. Counts the events that the machine wrote.
     fn execute(&mut self, step: &Step) -> Checked {
         let outcome = self.drive.execute(step);
-        for line in std::mem::take(&mut self.drive.events) {
+        for line in self.drive.take_events() {
             self.tally.hear(&line);
         }
         outcome

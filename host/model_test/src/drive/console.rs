@@ -2,9 +2,14 @@
 //!
 //! The content of an answer is not checked here, only its end.
 
-use super::{Drive, is_alarm, scale};
+use super::{Drive, is_alarm};
 use crate::machine::{Attended, Checked, Machine};
-use control::{operate::state::State, say::command::LineBuffer, settings::Setting};
+use control::{
+    operate::state::State,
+    say::command::LineBuffer,
+    settings::{Setting, Settings},
+    units::LengthScale,
+};
 use proptest::prelude::*;
 
 /// Turns in which every line must be answered, also during a write to the EEPROM.
@@ -13,6 +18,17 @@ const PATIENCE: u32 = 20_000;
 /// A short line is executed and answered within this time.
 const ANSWERED_S: f64 = 0.05;
 
+/// The lines sent and received.
+#[derive(Debug, Default)]
+pub(super) struct Console {
+    /// The line that the machine is answering.
+    current: String,
+    /// The number of answers that have ended.
+    answers: usize,
+    /// The alarms, warnings and greetings that the machine wrote, until the caller takes them.
+    pub(super) events: Vec<String>,
+}
+
 impl<M: Machine> Drive<M> {
     /// Types one or several lines, and waits until each has been answered once.
     pub(super) fn say(&mut self, text: &str) -> Checked {
@@ -20,15 +36,13 @@ impl<M: Machine> Drive<M> {
             // The reported unseen ground, which the operator vouches for.
             self.say("status")?;
         }
-        let lines = self.type_in(text);
-        let mut ends = 0;
+        let (lines, before) = (self.type_in(text), self.console.answers);
         for _ in 0..PATIENCE {
             if self.machine.is_done() {
-                prop_assert_eq!(ends, lines.len(), "ends of answers to {:?}", lines);
+                prop_assert_eq!(self.console.answers - before, lines.len(), "ends of answers to {:?}", lines);
                 return Ok(());
             }
             self.turn()?;
-            ends += self.written.iter().filter(|line| is_end(line)).count();
         }
         prop_assert!(false, "{text:?} is not answered");
         Ok(())
@@ -46,6 +60,7 @@ impl<M: Machine> Drive<M> {
     /// The console's part of a turn.
     pub(super) fn attend_to_the_console(&mut self) -> Checked {
         let (before, unseen_mm) = (self.machine.state(), self.machine.unseen_mm());
+        let scale_before = scale(self.machine.settings());
         let Attended { begun, written } = self.machine.attend()?;
         if let Some(line) = begun {
             self.begin(&line, before);
@@ -55,32 +70,30 @@ impl<M: Machine> Drive<M> {
                     self.trust(&line, unseen_mm);
                 }
             }
-            self.current = line;
+            self.console.current = line;
         }
-        if self.scale != scale(self.machine.settings()) {
-            self.scale = scale(self.machine.settings());
-            self.model.see_again(self.here());
+        if scale(self.machine.settings()) != scale_before {
+            self.expectations.model.see_again(self.here());
         }
         for end in written.iter().filter(|line| is_end(line)) {
             self.end(end, unseen_mm);
         }
-        written.iter().try_for_each(|line| self.hear(line))?;
-        self.written = written;
-        Ok(())
+        written.iter().try_for_each(|line| self.hear(line))
     }
 
     /// A line is executed, now or soon.
     fn begin(&mut self, line: &str, before: State) {
-        let words = words(line);
-        self.is_tried |= matches!(words[0], "servo" | "calibrate" | "test");
+        let (words, state) = (words(line), self.machine.state());
+        let (is_tried, saves) = (&mut self.expectations.is_tried, &mut self.expectations.saves);
+        *is_tried |= matches!(words[0], "servo" | "calibrate" | "test");
         if M::IS_OPEN {
-            self.is_tried &= self.machine.state() == State::Hold && !matches!(words[..], ["hold"] | ["servo", "out"]);
+            *is_tried &= state == State::Hold && !matches!(words[..], ["hold"] | ["servo", "out"]);
         }
-        self.saving = (words == ["save"]).then(|| self.machine.settings().clone());
-        if self.saving.is_some() {
-            self.leads_in_doubt = self.machine.settings_are_in_doubt();
+        saves.saving = (words == ["save"]).then(|| self.machine.settings().clone());
+        if saves.saving.is_some() {
+            saves.leads_in_doubt = self.machine.settings_are_in_doubt();
         }
-        if self.machine.state() != before {
+        if state != before {
             self.disturb();
         }
     }
@@ -94,18 +107,20 @@ impl<M: Machine> Drive<M> {
 
     /// The line that was begun has been answered.
     fn end(&mut self, end: &str, unseen_mm: i16) {
-        let (line, is_ok) = (std::mem::take(&mut self.current), end == "ok");
-        if let Some(saving) = self.saving.take()
+        self.console.answers += 1;
+        let (line, is_ok) = (std::mem::take(&mut self.console.current), end == "ok");
+        let (is_tried, saves) = (&mut self.expectations.is_tried, &mut self.expectations.saves);
+        if let Some(saving) = saves.saving.take()
             && is_ok
         {
-            self.saved = Some(saving);
+            saves.saved = Some(saving);
         }
         let words = words(&line);
         if matches!(words.first(), Some(&("label" | "teach" | "forget"))) {
-            self.taught = self.machine.examples();
+            saves.taught = self.machine.examples();
         }
         if !M::IS_OPEN && is_ok {
-            self.is_tried &= !matches!(words[..], ["hold"] | ["servo", "out"] | ["start", ..]);
+            *is_tried &= !matches!(words[..], ["hold"] | ["servo", "out"] | ["start", ..]);
             self.trust(&line, unseen_mm);
         }
     }
@@ -113,13 +128,39 @@ impl<M: Machine> Drive<M> {
     /// Opens the ground that the machine has not seen, if the line is the operator's `start now`.
     fn trust(&mut self, line: &str, unseen_mm: i16) {
         if words(line) == ["start", "now"] && unseen_mm > 0 {
-            let (tool, margin) = (self.here() - self.ticks(Setting::BeamToToolMm), self.ticks(Setting::MarginMm));
-            let unseen = f64::from(unseen_mm + 1) * f64::from(self.machine.settings().wheel().ticks(1000).0) / 1000.0;
+            let machine = &self.machine;
+            let (tool, margin) = (self.here() - machine.ticks(Setting::BeamToToolMm), machine.ticks(Setting::MarginMm));
+            let unseen = f64::from(unseen_mm + 1) * f64::from(machine.settings().wheel().ticks(1000).0) / 1000.0;
             // The distance rolled since the line was executed.
-            let late = if M::IS_OPEN { 0 } else { (self.speed.abs() * ANSWERED_S) as i64 };
+            let late = if M::IS_OPEN { 0 } else { (self.physics.speed.abs() * ANSWERED_S) as i64 };
             // That distance includes the margin ahead of the ground.
-            self.model.trust(tool - 2 * margin - late, tool + unseen as i64 - margin);
+            self.expectations.model.trust(tool - 2 * margin - late, tool + unseen as i64 - margin);
         }
+    }
+
+    /// Takes a line that the machine wrote, if it is an event or a greeting.
+    fn hear(&mut self, line: &str) -> Checked {
+        if line.starts_with("guarded ") {
+            return self.expectations.check_guarded(self.reported(line));
+        }
+        if line.starts_with("weed ") {
+            let width = value(line, "hold").map(i64::from).unwrap_or(0) - 2 * self.machine.ticks(Setting::MarginMm);
+            let behind = self.reported(line) - self.here();
+            if let Some(stand) = &mut self.expectations.stand {
+                stand.mistake(self.physics.ground as i64 + behind, width, behind);
+            }
+        }
+        if ["alarm ", "warning ", "weeder "].iter().any(|event| line.starts_with(event)) {
+            self.console.events.push(line.to_owned());
+        }
+        Ok(())
+    }
+
+    /// The position that an event reports.
+    fn reported(&self, line: &str) -> i64 {
+        let here = self.here();
+        let position = value(line, "pos").unwrap_or_default();
+        here + i64::from(position.wrapping_sub(self.machine.own_count(here)))
     }
 
     /// Asks the machine for the facts that are not visible from outside.
@@ -133,13 +174,24 @@ impl<M: Machine> Drive<M> {
         self.say("status")?;
         let state = self.machine.state();
         // Tests on the bench run only in HOLD.
-        self.is_tried &= state == State::Hold;
-        self.check_tool_stuck(state)
+        self.expectations.is_tried &= state == State::Hold;
+        self.physics.check_tool_stuck(state)
     }
+}
+
+/// The unit of the machine's positions on the ground. A change of the unit makes the machine forget the ground.
+fn scale(settings: &Settings) -> LengthScale {
+    LengthScale::of(settings.wheel().ticks(1000))
 }
 
 fn words(line: &str) -> Vec<&str> {
     line.split([' ', '\t']).filter(|word| !word.is_empty()).collect()
+}
+
+/// The number of a key in an event.
+fn value(line: &str, key: &str) -> Option<i32> {
+    let value = line.split(' ').find_map(|word| word.strip_prefix(key)?.strip_prefix('='))?;
+    value.parse().ok()
 }
 
 /// Whether the machine answers a line: backspaces may have emptied it.
