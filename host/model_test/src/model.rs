@@ -6,8 +6,8 @@
 //! was classified as a weed, and the command `start now`. The command opens only ground that `status` reports as
 //! unknown, because it was never seen or was forgotten. An alarm opens nothing.
 //!
-//! With a stem zone, the tool may work at either end of a wider detection: on half of the excess, but on at most 11/64 of
-//! the zone's width. A second beam can only add to a detection.
+//! With a stem zone, the tool may work at either end of a wider detection: on half of the excess, but on at most 11/64
+//! of the zone's width. A second beam can only add to a detection.
 //!
 //! Guarded ground is closed like a canopy from then on, with or without a plant.
 //!

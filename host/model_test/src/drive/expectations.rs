@@ -112,7 +112,7 @@ impl Expectations {
         }
     }
 
-    /// Error of the machine's positions, in ticks, from the sensor response that it expects: this sensor answers at once.
+    /// Error of the machine's positions, in ticks, from its expected sensor response. This sensor answers at once.
     pub(super) fn blur(&self) -> i64 {
         let (slowest, fastest) = self.speeds.extremes();
         (fastest.max(-slowest) * f64::from(self.response_ms) / 1000.0) as i64 + 1
@@ -161,7 +161,7 @@ impl Expectations {
         let [lead_out, lead_in] = self.leads_ms.map(lead);
         let lead_in = (1.25 * lead_in).min(lead_out);
         let ticks = |speed: f64, seconds: f64| (speed * seconds) as i64;
-        // The order to come back leads in the direction of rolling. So does the order to leave, at least by the slowest speed.
+        // Both orders lead in the direction of rolling, the order to leave at least by the slowest speed.
         let near = tool + ticks(fastest.max(0.0), lead_in) + 1;
         let far = tool + ticks(slowest.min(0.0), lead_in) - 1;
         let (from, to) = if slowest > 0.0 {
