@@ -11,6 +11,7 @@ use link::rows::{Rows, What};
 use link::session::Happening;
 use link::settings::other_version;
 use logbook::log::{Kind, LogError, LogWriter};
+use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -78,7 +79,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
                 }
             }
             Happening::Started { while_at_work: Some(cause), .. } => {
-                tell!("\x07{}", chosen.under_name(heard.row, &advice::restarted(&cause)));
+                let mut errors = io::stderr();
+                if errors.is_terminal() {
+                    // As for `tell!`: a bell that fails ends no record.
+                    let _ = errors.write_all(b"\x07");
+                }
+                tell!("{}", chosen.under_name(heard.row, &advice::restarted(&cause)));
             }
             Happening::Lost(why) => tell!("{}", chosen.under_name(heard.row, &why)),
             _ => {}

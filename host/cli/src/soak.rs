@@ -76,6 +76,10 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
         hours > 0 || uno_minutes > 0,
         "with --hours 0 and --uno-minutes 0 nothing is tried: one of them has to be above 0"
     );
+    ensure!(
+        uno_minutes > 0 || arguments.elf.is_none(),
+        "with --uno-minutes 0 no ELF is run: ask for some minutes, or leave out --elf"
+    );
     let part = Part::asked(arguments.shard, arguments.out.as_ref(), arguments.replace)?;
     let elf = (uno_minutes > 0).then(|| arguments.elf.clone().map_or_else(firmware::build, Ok)).transpose()?;
     let firmware = elf.as_deref().map(part::check_sum).transpose()?;
@@ -131,13 +135,16 @@ pub fn merge(study: &Study, mut tallies: Vec<Tally>, json: bool) -> Result<Findi
 
 /// Prints the summary of all stages. Returns whether all is well.
 fn conclude(study: &Study, stages: &[Stage], json: bool) -> Result<Finding> {
-    let &Study { seed, faults, .. } = study;
+    let &Study { seed, faults, hours, uno_minutes, .. } = study;
     let is_good = stages.iter().all(|stage| stage.tally.violations.is_empty());
     if json {
         let stages = stages.iter().map(Stage::in_json).collect::<Value>();
         say!("{:#}", json!({ "seed": seed, "faults_an_hour": faults, "parts": stages }))?;
     } else if !is_good {
-        say!("To see it again: weeder soak --seed {seed} --faults {faults}")?;
+        say!(
+            "To see it again, with the same --elf if one was named: weeder soak --seed {seed} --faults {faults} \
+             --hours {hours} --uno-minutes {uno_minutes}"
+        )?;
     }
     Ok(Finding::of(is_good))
 }

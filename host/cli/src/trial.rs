@@ -216,6 +216,10 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
         plants <= MOST_PLANTS,
         "this trial has some {plants:.0} plants, but has to have at most {MOST_PLANTS}: ask for fewer or shorter rows, or fewer replications"
     );
+    ensure!(
+        arguments.engine == EngineName::Uno || arguments.elf.is_none(),
+        "the engine `native` runs no ELF: name --engine uno as well, or leave out --elf"
+    );
     let engine = match arguments.engine {
         EngineName::Native => Engine::Native,
         EngineName::Uno => Engine::Uno(arguments.elf.clone().map_or_else(firmware::build, Ok)?),

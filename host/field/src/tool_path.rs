@@ -224,8 +224,9 @@ impl Swinging<'_> {
         if forward_mm == 0.0 {
             return self.motion.passings(at_mm).any(|passing| covers(self.stroke.degrees(passing.time_s)));
         }
-        // The arm moves the tool along the row as well, so it may pass the weed several times.
-        self.motion.times_within_s(&(at_mm - forward_mm..at_mm)).into_iter().any(|times| {
+        // The arm moves the tool along the row as well, so it may pass the weed several times. The last time it is behind the
+        // weed, not just at it.
+        self.motion.times_within_s(&(at_mm - forward_mm..at_mm + 1.0)).into_iter().any(|times| {
             let samples = ((times.end - times.start) / SAMPLE_S).ceil() as u32;
             let mut before = self.place_mm(times.start).0 >= weed.along_mm;
             (1..=samples).any(|sample| {
@@ -240,6 +241,7 @@ impl Swinging<'_> {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::conditions::Arm;
     use crate::row::{Canopy, Row};
     use rand::SeedableRng;
     use uno::CYCLES_PER_SECOND;
@@ -263,7 +265,10 @@ pub(crate) mod tests {
     }
 
     fn steered(stand: &Stand, steering: &Steering, out_mm: f64, in_mm: f64) -> Effect {
-        let machine = Machine::default();
+        on(&Machine::default(), stand, steering, out_mm, in_mm)
+    }
+
+    fn on(machine: &Machine, stand: &Stand, steering: &Steering, out_mm: f64, in_mm: f64) -> Effect {
         let motion = Motion::steady(-500.0, 1e6, 1000.0, 3000.0);
         let pulse = |tool_mm: f64, width_us: u64| {
             let passing = motion.passings(tool_mm + machine.beam_to_tool_mm).next().unwrap();
@@ -272,7 +277,7 @@ pub(crate) mod tests {
         };
         let first = Pulse { rise: 0, fall: 1500 * 16 };
         let pulses = [first, pulse(out_mm, 2000), pulse(in_mm, 1500)];
-        effect(stand, &machine, &Mechanism::default(), (&motion, steering), &pulses, 0)
+        effect(stand, machine, &Mechanism::default(), (&motion, steering), &pulses, 0)
     }
 
     #[test]
@@ -336,6 +341,17 @@ pub(crate) mod tests {
         let of_unseen = steered(&unseen, &Steering::default(), 1200.0, 1500.0);
         assert_eq!((of_unseen.damaged, of_unseen.unseen), (1, 1));
         assert_eq!(effect.in_row, WeedCount { before: 3, after: 1 });
+    }
+
+    #[test]
+    fn a_tool_in_the_row_takes_each_weed_that_it_rolls_over_on_either_arm() {
+        let weeds = (0..400).map(|number| Weed { along_mm: 300.0 + f64::from(number) * 1.237, across_mm: 0.0 });
+        let stand = Stand { weeds: weeds.collect(), ..stand() };
+        for arm in [Arm::Pendulum, Arm::Trailing] {
+            let machine = Machine { arm, ..Machine::default() };
+            let effect = on(&machine, &stand, &Steering::default(), 850.0, 1100.0);
+            assert_eq!(effect.in_row, WeedCount { before: 400, after: 0 }, "{arm:?}");
+        }
     }
 
     #[test]

@@ -44,6 +44,8 @@ pub fn tell_line(line: Arguments) {
 /// The command as it was typed, for a report that says how to make it again. Fails if a word cannot be quoted for a
 /// shell.
 pub fn command_line() -> Result<String> {
-    let words: Vec<String> = ["weeder".to_owned()].into_iter().chain(env::args().skip(1)).collect();
-    Ok(shlex::try_join(words.iter().map(String::as_str))?)
+    let words: Vec<_> = env::args_os().skip(1).collect();
+    let words = words.iter().map(|word| word.to_string_lossy());
+    let words: Vec<_> = ["weeder".into()].into_iter().chain(words).collect();
+    Ok(shlex::try_join(words.iter().map(AsRef::as_ref))?)
 }

@@ -48,7 +48,7 @@ pub struct Arguments {
     elf: Option<PathBuf>,
     /// Play a logic analyser's recording to the encoder's pins, and print what the firmware counts; - for standard
     /// input.
-    #[arg(long, value_name = "FILE.vcd", value_parser = source::file(), requires_all = ["channel_a", "channel_b"], conflicts_with_all = ["row", "out", "paper"])]
+    #[arg(long, value_name = "FILE.vcd", value_parser = source::file(), requires_all = ["channel_a", "channel_b"], conflicts_with_all = ["CourseArguments", "out", "paper"])]
     capture: Option<PathBuf>,
     /// The recording's channel for encoder A.
     #[arg(long, value_name = "NAME", requires = "capture")]

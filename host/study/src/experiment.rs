@@ -310,8 +310,9 @@ impl Experiment {
             Stand::grow(&self.conditions, spacing_cm * 10.0, &mut chance(0)).map_err(|problem| match problem {
                 Problem::Empty => anyhow!(
                     "the beam would see nothing in a row of {} m with plants {spacing_cm} cm apart: \
-                     ask for a longer row or a smaller spacing",
-                    self.conditions.plot.row_m
+                     ask for a longer row, a smaller spacing, or a beam lower than {} mm",
+                    self.conditions.plot.row_m,
+                    self.conditions.sensors.beam_height_mm
                 ),
                 _ => anyhow!(
                     "plants {spacing_cm} cm apart grow together to more than {MAX_WIDTH_MM} mm: \
