@@ -277,19 +277,15 @@ fn a_firmware_that_reaches_into_optiboot_is_refused() {
 }
 
 #[test]
-fn a_busy_port_is_named() {
-    let pty = Pty::open().unwrap();
-    let path = pty.path().to_string_lossy();
-    let _claim = serialport::new(path.clone(), 115_200).open().unwrap();
-    let output = weeder().args(["flash", "--port", &path]).output().unwrap();
-    assert_refused(&output, "is in use: close the serial monitor");
-}
-
-#[test]
-fn a_file_is_no_port() {
-    let file = tempfile::NamedTempFile::new().unwrap();
-    let output = weeder().args(["flash", "--port"]).arg(file.path()).output().unwrap();
-    assert_refused(&output, "cannot be opened as a serial port");
+fn a_busy_port_is_named_and_a_file_is_no_port() {
+    let (pty, file) = (Pty::open().unwrap(), tempfile::NamedTempFile::new().unwrap());
+    let _claim = serialport::new(pty.path().to_string_lossy(), 115_200).open().unwrap();
+    for (path, why) in
+        [(pty.path(), "is in use: close the serial monitor"), (file.path(), "cannot be opened as a serial port")]
+    {
+        let output = weeder().args(["flash", "--port"]).arg(path).output().unwrap();
+        assert_refused(&output, why);
+    }
 }
 
 #[test]
@@ -500,6 +496,5 @@ fn the_hex_file_has_the_content_of_the_elf() {
     assert_eq!(fs::read(&binary).unwrap(), Image::read(&elf).unwrap().flash);
 
     let nowhere = folder.path().join("no-such/weeder.hex");
-    let output = weeder().arg("hex").arg(&nowhere).arg("--elf").arg(&elf).output().unwrap();
-    assert_refused(&output, "No such file");
+    assert_refused(&weeder().arg("hex").arg(&nowhere).arg("--elf").arg(&elf).output().unwrap(), "No such file");
 }
