@@ -32,6 +32,7 @@ const LOOK_MS = 2;
 /** The virtual Uno, `weeder virtual-uno`, at its pseudo terminal. */
 export class VirtualUno implements Device {
     readonly path: string;
+    refuses?: { name: string; message: string };
     /** Number of bytes from the page after which the cable is unplugged. */
     pullAfterBytes = Number.POSITIVE_INFINITY;
     /** Indices of bytes that are lost on their way to it. */

@@ -88,14 +88,31 @@ test("the address with the code pairs by itself, and machines side by side are s
     // A HOLD that is lost says so, and is sent again until it is obeyed. Until then nothing starts.
     let isLost = true;
     await page.route("**/machines/1/command", (route) => (isLost ? route.abort() : route.continue()));
-    await part(page, "right", "hold").click();
-    await part(page, "right", "drive-said").filter({ hasText: "HOLD has not come through" }).waitFor();
-    assert.equal(await part(page, "right", "state").textContent(), "work");
-    await part(page, "right", "start").click();
-    await part(page, "right", "drive-said").filter({ hasText: "so this was not sent" }).waitFor();
+    const enter = async (line: string) => {
+        await part(page, "right", "typed").fill(line);
+        await part(page, "right", "typed").press("Enter");
+    };
+    for (const hold of [() => part(page, "right", "hold").click(), () => enter("hold.")]) {
+        await hold();
+        await part(page, "right", "drive-said").filter({ hasText: "HOLD has not come through" }).waitFor();
+        assert.equal(await part(page, "right", "state").textContent(), "work");
+        await part(page, "right", "start").click();
+        await part(page, "right", "drive-said").filter({ hasText: "so this was not sent" }).waitFor();
+        await enter("start now");
+        await part(page, "right", "said")
+            .getByText("start now: HOLD has not come through yet, so this was not sent")
+            .last()
+            .waitFor();
+        isLost = false;
+        await part(here.page, "right", "state").filter({ hasText: "hold" }).waitFor();
+        await part(page, "right", "drive-said").filter({ hasText: /^$/ }).waitFor({ state: "attached" });
+        await part(page, "right", "start").click();
+        await part(page, "right", "state").filter({ hasText: "work" }).waitFor();
+        isLost = true;
+    }
     isLost = false;
+    await part(page, "right", "hold").click();
     await part(here.page, "right", "state").filter({ hasText: "hold" }).waitFor();
-    await part(page, "right", "drive-said").filter({ hasText: /^$/ }).waitFor({ state: "attached" });
 
     // A change on one page is visible on another, and on a page opened later, with its help.
     await part(here.page, "right", "typed").fill("set k 5");

@@ -2,8 +2,9 @@
 
 import assert from "node:assert/strict";
 import test, { beforeEach } from "node:test";
-import { ServedMachine } from "../src/link/served.ts";
-import { type Happening, NoMachine, Refused } from "../src/link/session.ts";
+import { Served, ServedMachine } from "../src/link/served.ts";
+import { type Happening, NoMachine, NotSent, Refused } from "../src/link/session.ts";
+import { Machine } from "../src/panel/machine.ts";
 
 /** A command on its way. */
 interface Sent {
@@ -85,7 +86,7 @@ test("HOLD is sent at once, and what was typed before it and is not sent yet is 
     await held;
     sent[0]?.answer("ok\n");
     await dump;
-    await assert.rejects(start, new Refused("hold came first, so this was not sent"));
+    await assert.rejects(start, new NotSent("hold came first, so this was not sent"));
     await goOn();
     assert.deepEqual(lines(), ["dump", "hold", "status"]);
     sent[2]?.answer("ok\n");
@@ -101,7 +102,7 @@ test("a command says what its sender had seen when it was given, and HOLD needs 
     await goOn();
     sent[1]?.answer("ok\n");
     sent[0]?.answer("ok\n");
-    await Promise.all([status, held, assert.rejects(start, Refused)]);
+    await Promise.all([status, held, assert.rejects(start, NotSent)]);
     machine.ask("clear");
     await goOn();
     const told = sent.map(({ line, seen }) => [line, seen]);
@@ -176,4 +177,63 @@ test("a machine that is there has told all at once, and tells what others change
     const [settings, examples] = happened.slice(-2);
     assert(settings?.is === "settings" && settings.settings[0]?.value === 5);
     assert.deepEqual(examples, { is: "examples", examples: [] });
+});
+
+test("a machine that is lost at work weeds on, also when its absence is told again, until it is there", () => {
+    const shown = new Machine();
+    machine.onHappening = (happening) => shown.take(happening, 0);
+    machine.onAbsent = (why) => {
+        shown.lost = why;
+    };
+    for (const [mode, weedsOn] of [
+        ["hold", false],
+        ["work", true],
+    ] as const) {
+        machine.tell(THERE);
+        machine.tell({ is: "event", said: `state is=${mode}` });
+        for (const why of ["the port is gone", "the computer does not answer", "the port is gone"]) {
+            machine.tell({ is: "lost", why });
+            assert(shown.why.toLowerCase().startsWith(why), shown.why);
+            assert.equal(shown.why.includes("weeds on"), weedsOn, `${mode}: ${shown.why}`);
+        }
+    }
+    machine.tell(THERE);
+    shown.lost = "the machine does not answer";
+    shown.version = undefined;
+    assert(!shown.why.includes("weeds on"), shown.why);
+});
+
+test("a page whose operator stays after a new start of weeder serve is loaded again later", async (test) => {
+    let [status, reloads] = [200, 0];
+    const timers: { due: () => void; ms: number }[] = [];
+    const told: { error?: () => void } = {};
+    const { setTimeout } = globalThis;
+    test.after(() => Object.assign(globalThis, { setTimeout }));
+    globalThis.fetch = async () => new Response('{"machines":[]}', { status });
+    Object.assign(globalThis, {
+        setTimeout: (due: () => void, ms: number) => timers.push({ due, ms }),
+        // The operator stays: the call returns.
+        location: { reload: () => reloads++ },
+        EventSource: class {
+            addEventListener(name: "error", listener: () => void) {
+                told[name] = listener;
+            }
+            close() {}
+        },
+    });
+    const served = await Served.open();
+    served.listen();
+    status = 401;
+    told.error?.();
+    for (const [ms, expected] of [
+        [2000, 1],
+        [30_000, 2],
+        [30_000, 3],
+    ]) {
+        const timer = timers.at(-1);
+        assert.equal(timer?.ms, ms);
+        timer?.due();
+        for (let turn = 0; turn < 5; turn++) await goOn();
+        assert.equal(reloads, expected);
+    }
 });

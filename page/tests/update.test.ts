@@ -196,6 +196,12 @@ test("an Uno with another firmware is told with what changes, and gets its setti
     await page.locator("#work-panel").getByRole("button", { name: "Send" }).click();
     await part("said").locator("div", { hasText: /^ok$/ }).waitFor();
     await inspect(page, "phone-update");
+    for (const name of ["clear", "start"]) await part(name).click();
+    await part("state").filter({ hasText: "work" }).waitFor();
+    await page.getByRole("button", { name: "Save the settings and flash" }).click();
+    await part("connection-said").filter({ hasText: "The machine is at work, hold first." }).waitFor();
+    await part("hold").click();
+    await part("state").filter({ hasText: "hold" }).waitFor();
     const download = page.waitForEvent("download");
     await page.getByRole("button", { name: "Save the settings and flash" }).click();
     await (await download).saveAs("build/files/before.toml");

@@ -202,14 +202,37 @@ test("a cable that is pulled at work is told, and the machine is there again whe
         .waitFor();
     assert(await part(page, "start").isDisabled());
     await inspect(page, "desk-pulled");
+    const plugIn = () =>
+        page.evaluate(() => {
+            const { serial } = navigator as unknown as { serial: { ports: SerialPort[] } & EventTarget };
+            const event = new Event("connect");
+            Object.defineProperty(event, "target", { value: serial.ports[0] });
+            serial.dispatchEvent(event);
+        });
+    // Another program is faster the first time.
     uno.plugIn();
-    await page.evaluate(() => {
-        const { serial } = navigator as unknown as { serial: { ports: SerialPort[] } & EventTarget };
-        const event = new Event("connect");
-        Object.defineProperty(event, "target", { value: serial.ports[0] });
-        serial.dispatchEvent(event);
-    });
+    uno.refuses = { name: "NetworkError", message: "Failed to open serial port." };
+    await plugIn();
+    await page.getByText(/Not connected: /).waitFor();
+    delete uno.refuses;
+    await plugIn();
     await part(page, "state").filter({ hasText: "hold" }).waitFor();
+    await close({ page, errors });
+});
+
+test("a machine at work is not flashed, and one that is disconnected at work weeds on", async (test) => {
+    const { page, errors } = await atHold(test);
+    await part(page, "start").click();
+    await part(page, "state").filter({ hasText: "work" }).waitFor();
+    await page.getByRole("link", { name: "Flash" }).click();
+    await page.getByRole("button", { name: "Flash it" }).click();
+    await page.getByText("Not flashed: the machine is at work, hold first.").waitFor();
+    await page.getByRole("link", { name: "Work" }).click();
+    await part(page, "state").filter({ hasText: "work" }).waitFor();
+    await page.getByRole("button", { name: "Disconnect" }).click();
+    await part(page, "why")
+        .filter({ hasText: /No machine is connected\. .* weeds on: its work switch takes the tool out/ })
+        .waitFor();
     await close({ page, errors });
 });
 
@@ -348,6 +371,7 @@ test("pasted lines are typed one by one, whatever ends them, and HOLD drops the 
     await part(page, "said").locator("div.typed", { hasText: "> hold" }).waitFor();
     await type(page, "get k");
     assert(!(await lines()).includes("> start"));
+    await part(page, "said").getByText("start: hold came first, so this was not sent").waitFor();
     await close({ page, errors });
 });
 

@@ -13,18 +13,26 @@ thread_local! {
     static SESSIONS: RefCell<Vec<Option<Session>>> = const { RefCell::new(Vec::new()) };
 }
 
+/// A [`Moment`] by the page's clocks, in milliseconds.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct Clocks {
+    ticking_ms: f64,
+    calendar_ms: f64,
+}
+
 /// A request to a session.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase", rename_all_fields = "camelCase")]
 pub enum What {
     /// Type a command. Answers its number, or `null` if it is no command or too many wait.
-    Command { line: String, deadline_ms: f64 },
+    Command { line: String, deadline: Clocks },
     /// Type `hold` at once. Answers its number.
     Hold,
     /// What has the wire received, with a character for each byte? Answers what happened.
     Listen { received: String },
     /// What is the time? Answers what happened, and what to send.
-    Turn { now_ms: f64 },
+    Turn { now: Clocks },
     /// The wire is closed, and why. Answers the ends of all commands.
     Close { why: String },
 }
@@ -50,14 +58,14 @@ pub fn take(number: usize, what: What) -> Result<Value, String> {
         let place = sessions.get_mut(number).ok_or("there is no such session")?;
         let session = place.as_mut().ok_or("the session is closed")?;
         Ok(match what {
-            What::Command { line, deadline_ms } => json!(session.command(&line, moment(deadline_ms))),
+            What::Command { line, deadline } => json!(session.command(&line, deadline.into())),
             What::Hold => json!(session.hold()),
             What::Listen { received } => {
                 let received: Vec<u8> = received.chars().map(|byte| u8::try_from(byte).unwrap_or(b'?')).collect();
                 listen(session, &received)
             }
-            What::Turn { now_ms } => {
-                let turn = session.turn(moment(now_ms), &[]);
+            What::Turn { now } => {
+                let turn = session.turn(now.into(), &[]);
                 answer(session, turn)
             }
             What::Close { why } => {
@@ -75,10 +83,11 @@ fn listen(session: &mut Session, received: &[u8]) -> Value {
     answer(session, Turn { happened, ..Turn::default() })
 }
 
-/// A page has one clock.
-fn moment(ms: f64) -> Moment {
-    let time = Duration::try_from_secs_f64(ms / 1000.0).unwrap_or_default();
-    Moment { ticking: time, calendar: time }
+impl From<Clocks> for Moment {
+    fn from(clocks: Clocks) -> Self {
+        let time = |ms: f64| Duration::try_from_secs_f64(ms / 1000.0).unwrap_or_default();
+        Self { ticking: time(clocks.ticking_ms), calendar: time(clocks.calendar_ms) }
+    }
 }
 
 /// A turn in the form of `Turn` in `page/src/link/session.ts`.
@@ -112,9 +121,10 @@ mod tests {
         let request = |what| take(number, what);
         let heard = request(What::Listen { received: "\u{ff}\u{100}\r\n".to_owned() }).unwrap();
         assert_eq!(heard, json!({ "news": [], "send": "", "failure": null }));
-        let turn = request(What::Turn { now_ms: 0.0 }).unwrap();
+        let turn = request(What::Turn { now: Clocks { ticking_ms: 0.0, calendar_ms: 0.0 } }).unwrap();
         assert!(turn["send"].as_str().unwrap().ends_with("\u{8}\n") && turn["failure"].is_null(), "{turn}");
-        assert_eq!(request(What::Command { line: "two\nlines".to_owned(), deadline_ms: 9.0 }), Ok(Value::Null));
+        let deadline = Clocks { ticking_ms: 9.0, calendar_ms: 9.0 };
+        assert_eq!(request(What::Command { line: "two\nlines".to_owned(), deadline }), Ok(Value::Null));
         assert_eq!(request(What::Hold), Ok(json!(1)));
         let closed = request(What::Close { why: "pulled".to_owned() }).unwrap();
         assert_eq!(

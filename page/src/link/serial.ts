@@ -157,7 +157,7 @@ export function sessionOver(line: SerialLine, now: number): Session {
     const encoder = new TextEncoder();
     // A lost line has reported its error.
     const send = (text: string) => void line.write(encoder.encode(text)).catch(() => {});
-    const session = new Session({ send, close: () => line.close() }, now, true);
+    const session = new Session({ send, close: () => line.close() }, now, true, Date.now);
     // A byte is one character: the input may be noise, which is no valid UTF-8.
     line.onBytes = (bytes) => session.receive(String.fromCharCode(...bytes));
     line.onEnd = ({ message }) => session.end(message);

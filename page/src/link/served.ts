@@ -9,12 +9,14 @@
 
 import { english } from "../words/words.ts";
 import { read } from "./grammar.ts";
-import { type Happening, type Link, type News, NoMachine, Refused, tell } from "./session.ts";
+import { type Happening, type Link, type News, NoMachine, NotSent, Refused, tell } from "./session.ts";
 
 /** Silence after which the computer counts as lost: it sends a message twice a second. */
 const SILENCE_MS = 3000;
 /** Time between two tries to reach it. */
 const RETRY_MS = 2000;
+/** Time between two tries to load the page again. The browser asks each time while the log is not saved. */
+const RELOAD_MS = 30_000;
 /** Time limit of a HOLD, and of a question about the computer. The page then tries again. */
 const SHORT_MS = 1500;
 /** Time limit of a command, and of a HOLD to all: the computer gives a silent machine up after 3 s. */
@@ -127,9 +129,11 @@ export class Served {
     async #again(): Promise<void> {
         const answer = await send("/machines", SHORT_MS).catch(() => undefined);
         // A new start of `weeder serve` has another code, so it answers with the form. It may have other machines.
-        if (answer?.status === 401 || (answer?.isOk && answer.text !== this.text)) location.reload();
-        else if (answer?.isOk) this.listen();
-        else setTimeout(() => void this.#again(), RETRY_MS);
+        const isOther = answer?.status === 401 || (answer?.isOk && answer.text !== this.text);
+        if (isOther) location.reload();
+        else if (answer?.isOk) return this.listen();
+        // An operator who stays has time to save the log.
+        setTimeout(() => void this.#again(), isOther ? RELOAD_MS : RETRY_MS);
     }
 }
 
@@ -156,7 +160,7 @@ export class ServedMachine implements Link {
         // What the operator has seen, and not what is seen when the command's turn comes.
         const seen = this.seen();
         const answer = this.#answered.then(() => {
-            if (holds !== this.#holds) throw new Refused(english("holdFirst"));
+            if (holds !== this.#holds) throw new NotSent(english("holdFirst"));
             const gone = this.#there?.signal;
             if (!gone) throw new NoMachine(english("servedNotThere"));
             return this.#type(command, LONG_MS, { headers: { "Weeder-Seen": seen } }, gone);

@@ -54,8 +54,8 @@ export const isHold = (line: string): boolean => /^\s*hold[\s!-/:-@[-\x60{-~]*$/
 /** No machine answers, and what to do. */
 export class NoMachine extends Error {}
 
-/** A line that cannot be typed, and what would be right. */
-export class NoCommand extends Error {}
+/** The page has not sent a line: why, and what would be right. */
+export class NotSent extends Error {}
 
 /** A machine to talk to: by a session here, or by the session of another computer (served.ts). */
 export interface Link {
@@ -145,11 +145,15 @@ export class Session implements Link {
     /** The lines of the answer in progress. */
     #answer: string[] = [];
 
-    /** `resets` says whether opening the wire resets the Uno. */
+    /**
+     * `resets` says whether opening the wire resets the Uno. `calendarMs` goes on while the computer sleeps: there the
+     * clock of `turn` stands still on some systems. Without it, that clock is the only one.
+     */
     constructor(
         private readonly wire: Wire,
         private now: number,
         resets: boolean,
+        private readonly calendarMs = () => this.now,
     ) {
         this.#session = ask<number>({ open: resets });
     }
@@ -162,11 +166,11 @@ export class Session implements Link {
 
     ask(line: string): Promise<string[]> {
         if (this.#ended) return Promise.reject(new NoMachine(english("noneConnected")));
-        const number = this.#request<number | null>({ command: { line, deadlineMs: this.now + WAIT_MS } });
+        const number = this.#request<number | null>({ command: { line, deadline: this.#moment(WAIT_MS) } });
         if (number !== null) return this.#end(number);
         const isText = /^[ -~]*$/.test(line);
         const why = line.length > 80 ? "refusedTooLong" : isText ? "tooMuchWaits" : "refusedNotText";
-        return Promise.reject(new NoCommand(english(why)));
+        return Promise.reject(new NotSent(english(why)));
     }
 
     async hold(): Promise<void> {
@@ -179,7 +183,7 @@ export class Session implements Link {
     turn(now: number): void {
         this.now = now;
         this.#listen();
-        this.#go({ turn: { nowMs: now } });
+        this.#go({ turn: { now: this.#moment() } });
     }
 
     async close(): Promise<void> {
@@ -216,6 +220,11 @@ export class Session implements Link {
             this.#isTurning = false;
         }
         if (why !== null) this.end(why);
+    }
+
+    /** The time now, or some time later, by both clocks. */
+    #moment(laterMs = 0) {
+        return { tickingMs: this.now + laterMs, calendarMs: this.calendarMs() + laterMs };
     }
 
     #request<Answer>(what: unknown): Answer {
@@ -275,7 +284,7 @@ function whyNone({ is, about }: Failure): string {
 
 /** Why a command was not answered. */
 function whyNot(why: "late" | "held" | "notTyped" | "unknown", because: string): Error {
-    if (why === "late") return new Refused(english("waitedTooLong"));
-    if (why === "held") return new Refused(english("holdFirst"));
+    if (why === "late") return new NotSent(english("waitedTooLong"));
+    if (why === "held") return new NotSent(english("holdFirst"));
     return new NoMachine(why === "unknown" ? english("mayBeDone", { why: because }) : because);
 }

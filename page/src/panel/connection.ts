@@ -4,11 +4,15 @@
 import type { Parts } from "../dom.ts";
 import { choosePort, PortError, SerialLine, sessionOver, whyNoSerial } from "../link/serial.ts";
 import { english, say, told } from "../words/words.ts";
+import { sentence } from "./machine.ts";
 import { type Panel, TURN_MS } from "./panel.ts";
 import { Update } from "./update.ts";
 
 /** The firmware's rate. */
 const BAUD = 115_200;
+
+/** Why a machine is not flashed. */
+const AT_WORK = english("refusedAtWork");
 
 export class Connection {
     /** Called after the port was closed, so that the operator can flash the machine. */
@@ -34,6 +38,10 @@ export class Connection {
                 void this.connect(target as SerialPort);
         });
         const update = new Update(parts, panel, async () => {
+            if (panel.machine.isAtWork) {
+                this.#say(() => sentence(told(AT_WORK)));
+                return;
+            }
             await this.disconnect();
             this.onFlash();
         });
@@ -57,8 +65,10 @@ export class Connection {
         this.#isBusy = true;
         await this.#attempt(async () => {
             await this.disconnect();
+            // Also where it does not open: its next cable is then noticed.
+            this.#port = port;
             const line = await SerialLine.open(port, BAUD);
-            [this.#port, this.#isOpen] = [port, true];
+            this.#isOpen = true;
             const now = performance.now();
             this.panel.connect(sessionOver(line, now), now);
             this.#say(() => say("waitingForAnswer"));
@@ -75,8 +85,11 @@ export class Connection {
         this.#show();
     }
 
+    /** Closes a port that is to be flashed. Throws a PortError if its machine is at work. */
     async release(port: SerialPort): Promise<void> {
-        if (port === this.#port) await this.disconnect();
+        if (port !== this.#port) return;
+        if (this.panel.machine.isAtWork) throw new PortError(AT_WORK);
+        await this.disconnect();
     }
 
     async #stayLit(): Promise<void> {

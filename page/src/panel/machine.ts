@@ -72,6 +72,7 @@ export class Machine {
                 this.settings = happening.settings;
                 this.examples = happening.examples;
                 this.help = happening.help;
+                this.#mayWeedOn = false;
                 [this.objects, this.zones] = [[], []];
                 [this.warning, this.status, this.mode, this.toolOut] = [undefined, undefined, undefined, undefined];
                 break;
@@ -86,7 +87,7 @@ export class Machine {
                 this.version = undefined;
                 this.lost = happening.why;
                 // The operator must know where to find HOLD now.
-                this.#mayWeedOn = happening.forGood && !happening.isWanted && this.mode === "work";
+                this.#mayWeedOn = happening.forGood && this.mode === "work";
                 [this.alarm, this.warning, this.status] = [undefined, undefined, undefined];
                 break;
             case "settings":
@@ -164,9 +165,14 @@ export class Machine {
         return status.position + this.ticks((status.speedMmS * Math.min(nowMs - this.statusMs, 500)) / 1000);
     }
 
-    /** Marks it as lost. `why` is in English. */
+    /** Why it is lost, in English. What it may do without a connection stays. */
     set lost(why: string) {
-        [this.#lost, this.#mayWeedOn] = [why, false];
+        this.#lost = why;
+    }
+
+    /** Whether it is connected and works, as far as it has told. */
+    get isAtWork(): boolean {
+        return this.version !== undefined && this.mode === "work";
     }
 
     get state(): Mode | "none" | "unknown" {

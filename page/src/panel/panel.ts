@@ -7,7 +7,7 @@ import { download, Parts } from "../dom.ts";
 import type { EventLine } from "../link/console_line.ts";
 import { Log } from "../link/log.ts";
 import type { Allowed } from "../link/served.ts";
-import { type Ask, type Happening, isHold, type Link, NoCommand, NoMachine, Refused } from "../link/session.ts";
+import { type Ask, type Happening, isHold, type Link, NoMachine, NotSent } from "../link/session.ts";
 import { isStill, STILL_MS } from "../preferences.ts";
 import { signal } from "../signals.ts";
 import { english, number, onLanguage, quantity, say, told, translate } from "../words/words.ts";
@@ -113,8 +113,7 @@ export class Panel {
 
     /** Whether closing the page would leave a machine at work, or drop an unsaved log. */
     get isNeeded(): boolean {
-        const { version, mode } = this.machine;
-        return (version !== undefined && mode === "work") || this.#log.isUnsaved;
+        return this.machine.isAtWork || this.#log.isUnsaved;
     }
 
     /**
@@ -126,11 +125,16 @@ export class Panel {
             this.#parts.say("drive-said", () => sentence(told(english("noneConnected"))));
             return;
         }
-        this.#isHolding = this.machine.mode === "work";
-        this.#holdPending = { againMs: undefined };
-        void this.#sendHold(this.#holdPending);
+        void this.#holdNow().catch(() => {});
     }
 
+    #holdNow(): Promise<void> {
+        this.#isHolding = this.machine.mode === "work";
+        this.#holdPending = { againMs: undefined };
+        return this.#sendHold(this.#holdPending);
+    }
+
+    /** Sends a HOLD. If it does not come through, it is sent again later, and this fails with the reason. */
     async #sendHold(pending: { againMs: number | undefined; why?: string }): Promise<void> {
         pending.againMs = undefined;
         const said = this.#parts.html("drive-said");
@@ -146,10 +150,12 @@ export class Panel {
             pending.againMs = this.#now + HOLD_AGAIN_MS;
             const { message } = error as Error;
             // The same reason again would hide what was told since.
-            if (this.#holdPending !== pending || pending.why === message) return;
-            pending.why = message;
-            said.classList.add("problem");
-            this.#parts.say("drive-said", () => say("holdFailed", { why: told(error).replace(/\.$/, "") }));
+            if (this.#holdPending === pending && pending.why !== message) {
+                pending.why = message;
+                said.classList.add("problem");
+                this.#parts.say("drive-said", () => say("holdFailed", { why: told(error).replace(/\.$/, "") }));
+            }
+            throw error;
         }
     }
 
@@ -172,8 +178,8 @@ export class Panel {
     ask(command: string): Promise<string[]> {
         if (!this.#link) return Promise.reject(new NoMachine(english("noneConnected")));
         if (this.#holdPending && /^\s*start\b/i.test(command))
-            return Promise.reject(new Refused(english("holdPending")));
-        if (isHold(command)) return this.#link.hold().then(() => []);
+            return Promise.reject(new NotSent(english("holdPending")));
+        if (isHold(command)) return this.#holdNow().then(() => []);
         return this.#link.ask(command);
     }
 
@@ -188,7 +194,7 @@ export class Panel {
     turn(nowMs: number): void {
         this.#now = this.machine.nowMs = nowMs;
         const pending = this.#holdPending;
-        if (pending?.againMs !== undefined && nowMs >= pending.againMs) void this.#sendHold(pending);
+        if (pending?.againMs !== undefined && nowMs >= pending.againMs) void this.#sendHold(pending).catch(() => {});
         this.#link?.turn?.(nowMs);
     }
 
@@ -282,7 +288,9 @@ export class Panel {
         } catch (error) {
             const { message } = error as Error;
             this.#parts.write("answered", told(message));
-            if (error instanceof NoMachine || error instanceof NoCommand) this.#console.add(message, "error");
+            // The console has no line of what was not sent.
+            if (error instanceof NotSent) this.#console.add(`${line}: ${message}`, "error");
+            if (error instanceof NoMachine) this.#console.add(message, "error");
         }
     }
 
