@@ -49,6 +49,9 @@ const FLASH = "F".charCodeAt(0);
 /** Bytes of a page of flash (data sheet, table 27-13). */
 export const PAGE_BYTES = 128;
 
+/** A first page that jumps to itself (rjmp .-2): the bootloader starts at address 0. */
+const STANDSTILL = new Uint8Array(PAGE_BYTES).fill(0xff).fill(0xcf, 1, 2);
+
 /** The signature of an ATmega328P, and of compatible chips. */
 const SIGNATURE = "1e950f";
 const OTHERS: Readonly<Record<string, string>> = {
@@ -89,20 +92,26 @@ export class Bootloader {
         };
     }
 
-    /** Writes a firmware and reads it back. Throws a FlashError, or a PortError if the line is gone. */
+    /**
+     * Writes a firmware and reads it back. Its first page is written last, so that a part of it never runs. Throws a
+     * FlashError, or a PortError if the line is gone.
+     */
     async flash(image: Uint8Array, onProgress: (progress: Progress) => void): Promise<void> {
         onProgress({ phase: "waiting", share: 0 });
         await this.#call();
         await this.#expectChip();
         await this.#command([ENTER_PROGRAMMING], 0);
-        for (let at = 0; at < image.length; at += PAGE_BYTES) {
-            onProgress({ phase: "writing", share: at / image.length });
-            const page = image.subarray(at, at + PAGE_BYTES);
+        const pageAt = (at: number) => ({ at, page: image.subarray(at, at + PAGE_BYTES) });
+        const writes: ReturnType<typeof pageAt>[] = [{ at: 0, page: STANDSTILL }];
+        for (let at = PAGE_BYTES; at < image.length; at += PAGE_BYTES) writes.push(pageAt(at));
+        writes.push(pageAt(0));
+        for (const [done, { at, page }] of writes.entries()) {
+            onProgress({ phase: "writing", share: done / writes.length });
             await this.#onPage(at, [PROGRAM_PAGE, 0, page.length, FLASH, ...page], 0);
         }
         for (let at = 0; at < image.length; at += PAGE_BYTES) {
             onProgress({ phase: "verifying", share: at / image.length });
-            const page = image.subarray(at, at + PAGE_BYTES);
+            const { page } = pageAt(at);
             const found = await this.#onPage(at, [READ_PAGE, 0, page.length, FLASH], page.length);
             const wrong = page.findIndex((byte, index) => byte !== found[index]);
             if (wrong >= 0)
