@@ -109,6 +109,6 @@ export function download(name: string, text: string, type: string): void {
     link.href = URL.createObjectURL(new Blob([text], { type }));
     link.download = name;
     link.click();
-    // The download has begun by then.
-    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+    // The download has begun by then, also where the browser asks first.
+    setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
 }

@@ -27,6 +27,7 @@ const ONCE_MS = 300;
 const GAIN = 0.4;
 
 let context: AudioContext | undefined;
+let changed = () => {};
 /** End of the last tone, by the context's clock. */
 let busyUntilS = 0;
 const lastMs: Partial<Record<Signal, number>> = {};
@@ -39,20 +40,24 @@ export const isWaiting = (): boolean => isOn() && context?.state !== "running";
 /** Turns signals on or off. Turning on plays one as a test. */
 export function turn(on: boolean): void {
     keep("sound", on ? "on" : "off");
-    if (on) signal("held");
+    if (on) void wake().then(() => signal("held"));
     else navigator.vibrate?.(0);
 }
 
 /** Calls `changed` when `isWaiting` may have changed. */
-export function wakeOnTouch(changed: () => void): void {
-    const wake = async () => {
-        context ??= new AudioContext();
-        if (context.state !== "running") await context.resume();
-        changed();
-    };
+export function wakeOnTouch(use: () => void): void {
+    changed = use;
     // The first of these events is a touch for the browser.
     for (const touch of ["pointerup", "keydown"])
         document.addEventListener(touch, () => void wake(), { capture: true });
+}
+
+async function wake(): Promise<void> {
+    context ??= new AudioContext();
+    // A call or a locked screen stops it.
+    context.onstatechange = changed;
+    if (context.state !== "running") await context.resume();
+    changed();
 }
 
 /** Plays a signal, after those that are still playing. */
@@ -63,7 +68,8 @@ export function signal(which: Signal): void {
     const { hz, ms, pauseMs, vibration } = SOUNDS[which];
     // An untouched page may not vibrate, and the browser logs an error.
     if (navigator.userActivation?.hasBeenActive !== false) navigator.vibrate?.([...vibration]);
-    if (!context) return;
+    // Its clock stands: the tones would all come at the next touch.
+    if (context?.state !== "running") return;
     let atS = Math.max(context.currentTime, busyUntilS);
     for (const [number, frequency] of hz.entries()) {
         const lengthMs = ms[number] ?? 0;

@@ -6,7 +6,8 @@ import { resolve } from "node:path";
 import test, { after, before } from "node:test";
 import type { Browser, Page } from "playwright-core";
 import { hex } from "../src/core.ts";
-import { BOARDS } from "../src/flasher/stk500.ts";
+import { BOARDS, type Board, Bootloader } from "../src/flasher/stk500.ts";
+import type { SerialLine } from "../src/link/serial.ts";
 import { FLASH_BYTES } from "../src/uno/chip.ts";
 import { readHex, usedBytes } from "../src/uno/hex.ts";
 import { close, inspect, launch, open, PHONE, served } from "./browser.ts";
@@ -87,6 +88,45 @@ test("a cable that is pulled while it is flashed is told, and the same board is 
     await opened.page.getByRole("button", { name: "Flash it" }).click();
     await opened.page.locator("[data-part=flash-said]", { hasText: "Done" }).waitFor();
     await close(opened);
+});
+
+test("the first page jumps to itself until all others are written", async () => {
+    // Timers as the browser's worker has them.
+    class Timers extends EventTarget {
+        postMessage([data, ms]: [number, number]) {
+            setTimeout(() => this.dispatchEvent(new MessageEvent("message", { data })), ms);
+        }
+    }
+    Object.assign(globalThis, { Worker: Timers });
+    for (const pages of [1, 3]) {
+        const [writes, memory]: [number[], number[]] = [[], new Array(384).fill(0xee)];
+        let at = 0;
+        const answer = ([command = 0, low = 0, high = 0, , ...data]: number[]): number[] => {
+            if (command === 0x75) return [0x1e, 0x95, 0x0f];
+            if (command === 0x55) at = 2 * (low + 256 * high);
+            if (command === 0x64) {
+                writes.push(at);
+                memory.splice(at, 128, ...data.slice(0, -1));
+                if (writes.length <= pages) assert.deepEqual(memory.slice(0, 3), [0xff, 0xcf, 0xff]);
+            }
+            return command === 0x74 ? memory.slice(at, at + 128) : [];
+        };
+        const line = {
+            onBytes: (_: number[]) => {},
+            reset: async () => {},
+            write: async (bytes: Uint8Array) => line.onBytes([0x14, ...answer([...bytes]), 0x10]),
+        };
+        const image = Uint8Array.from({ length: 128 * pages }, (_, place) => place % 251);
+        const shares: number[] = [];
+        const bootloader = new Bootloader(line as unknown as SerialLine, BOARDS[0] as Board);
+        await bootloader.flash(image, ({ phase, share }) => phase === "writing" && shares.push(share));
+        assert.deepEqual(writes, [0, ...[128, 256].slice(0, pages - 1), 0]);
+        assert.deepEqual(memory.slice(0, image.length), [...image]);
+        assert.deepEqual(
+            shares,
+            shares.map((_, done) => done / (pages + 1)),
+        );
+    }
 });
 
 test("a byte that is lost on the way is sent again", async (test) => {
@@ -204,7 +244,11 @@ test("a browser without Web Serial is told so, with the HEX and the command that
     assert(await page.getByRole("button", { name: "Flash it" }).isDisabled());
     const download = page.waitForEvent("download");
     await page.getByRole("button", { name: "Save the HEX as a file" }).click();
-    assert.equal((await download).suggestedFilename(), "weeder.hex");
+    const file = await download;
+    assert.equal(file.suggestedFilename(), "weeder.hex");
+    // A browser may ask before it reads the file.
+    await page.waitForTimeout(1500);
+    assert((await page.evaluate(async (url) => (await fetch(url)).text(), file.url())).startsWith(":"));
     await inspect(page, "phone-no-serial");
     await page.close();
 });

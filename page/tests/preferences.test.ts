@@ -19,6 +19,7 @@ const heard = (page: Page) => page.evaluate(() => globalThis.signals.splice(0).j
 
 declare global {
     var signals: string[];
+    var audio: AudioContext;
 }
 
 test("theme, sound and board are kept from one visit to the next", async () => {
@@ -78,6 +79,7 @@ test("an alarm, a lost machine and an obeyed HOLD are each heard and felt as ano
         const { start } = OscillatorNode.prototype;
         OscillatorNode.prototype.start = function (at) {
             globalThis.signals.push(String(this.frequency.value));
+            globalThis.audio = this.context as AudioContext;
             start.call(this, at);
         };
         navigator.vibrate = (pattern) => {
@@ -96,8 +98,8 @@ test("an alarm, a lost machine and an obeyed HOLD are each heard and felt as ano
 
     const held = "vibrates 80,60,80 660 990";
     await sound.click();
-    assert.equal(await heard(page), held, "turned on, it is heard at once");
     await page.waitForFunction(() => !document.querySelector("#sound.waiting"));
+    assert.equal(await heard(page), held, "turned on, it is heard at once");
     await part(page, "start").click();
     await part(page, "state").filter({ hasText: "work" }).waitFor();
     // The answer to HOLD and the following state, with the delay of a slow line.
@@ -131,5 +133,12 @@ test("an alarm, a lost machine and an obeyed HOLD are each heard and felt as ano
         .getByText(/reset by reset_pin/)
         .waitFor();
     assert.equal(await heard(page), "vibrates 1000 660 440 330");
+    // A call stops the browser's sound: the button says so, and no tone waits for the next touch.
+    await part(page, "state").filter({ hasText: "hold" }).waitFor();
+    await page.evaluate(() => globalThis.audio.suspend());
+    await page.locator("#sound.waiting").waitFor();
+    await page.evaluate(() => globalThis.simulation.uno.reset("external"));
+    await page.waitForFunction(() => globalThis.signals.length > 0);
+    assert.equal(await heard(page), "vibrates 1000");
     await close(opened);
 });
