@@ -112,6 +112,26 @@ test("a log that lacks the settings behind revert says from when on it is not dr
     await close(opened);
 });
 
+test("the buttons lead to each of several alarms at one position", async () => {
+    const status = (ms: number) => `${ms},status,state=work tool=in pos=${ms} speed_mm_s=500 windows=0 unseen_mm=0`;
+    const lines = ["time_ms,kind,line", "0,connected,0.2.0", "0,setting,ticks_per_m=2000", status(0), status(2000)];
+    lines.push("2000,event,warning name=no_plants pos=2000", "2000,event,alarm code=3-1 name=too_fast pos=2000");
+    writeFileSync("build/files/two.csv", `${[...lines, status(4000)].join("\n")}\n`);
+    const opened = await openLog("build/files/two.csv");
+    const { page } = opened;
+    await inView(page, "log-place").fill("0");
+    for (const [button, said] of [
+        ["alarm-next", "no_plants"],
+        ["alarm-next", "too_fast"],
+        ["alarm-next", "no alarm behind"],
+        ["alarm-before", "no_plants"],
+    ] as const) {
+        await inView(page, button).click();
+        await inView(page, "log-alarm").filter({ hasText: said }).waitFor();
+    }
+    await close(opened);
+});
+
 /**
  * A log of this many hours as `weeder record` writes it: at 2.5 km/h, with a status ten times a second, a plant each
  * 0.3 m, its swings, and an alarm an hour.

@@ -15,6 +15,7 @@ import {
     type Replayed,
     read,
     type Speed,
+    type Trouble,
     type Work,
 } from "./picture.ts";
 
@@ -54,6 +55,8 @@ export class RecordView {
     #rows: readonly Row[] = [];
     #windowMm = WINDOW_MM.first;
     #middleMm = 0;
+    /** The flag that the rows were moved to, until they are moved on. */
+    #flag: Trouble | undefined;
     #isToBeDrawn = false;
     #work = new AbortController();
 
@@ -180,21 +183,34 @@ export class RecordView {
     }
 
     #go(middleMm: number): void {
+        this.#flag = undefined;
         this.#middleMm = Math.min(Math.max(middleMm, 0), this.#endMm);
         this.#place.value = String(Math.round(this.#middleMm));
         this.#draw();
     }
 
     #toAlarm(way: 1 | -1): void {
-        const alarms = this.#rows.flatMap(({ file, picture }) => picture.alarms.map((alarm) => ({ ...alarm, file })));
         // After rolling back, the machine may have reached an alarm's position again.
-        const ahead = alarms.filter(({ mm }) => way * (mm - this.#middleMm) > 0.5);
-        const next = ahead.sort((one, other) => way * (one.mm - other.mm))[0];
-        if (next) this.#go(next.mm);
+        const flags = this.#rows
+            .flatMap(({ file, picture }) => picture.alarms.map((flag) => ({ flag, file })))
+            .sort((one, other) => one.flag.mm - other.flag.mm);
+        // Several flags may be at the same position.
+        const shown = flags.findIndex(({ flag }) => flag === this.#flag);
+        const ahead = flags.filter(({ flag }, at) =>
+            shown < 0 ? way * (flag.mm - this.#middleMm) > 0.5 : way * (at - shown) > 0,
+        );
+        const next = ahead.at(way > 0 ? 0 : -1);
+        if (next) {
+            this.#go(next.flag.mm);
+            this.#flag = next.flag;
+        }
         this.parts.say("log-alarm", () => {
             if (!next) return say(way > 0 ? "noAlarmNext" : "noAlarmBefore");
-            const { title, advice } = fault(next.name);
-            return this.#of(next.file, `${say(next.isWarning ? "warning" : "alarm", { title })}: ${sentence(advice)}`);
+            const { title, advice } = fault(next.flag.name);
+            return this.#of(
+                next.file,
+                `${say(next.flag.isWarning ? "warning" : "alarm", { title })}: ${sentence(advice)}`,
+            );
         });
     }
 
