@@ -44,6 +44,11 @@ export class Calibration {
         parts.button("servo-save", () => void this.#do("servo-said", "save", () => say("isSavedNow")));
     }
 
+    /** Forgets where the stretch began: after a reset, positions begin at 0 again. */
+    forget(): void {
+        this.#from = undefined;
+    }
+
     /** Shows the values that change while the machine rolls. */
     show(): void {
         const { status, tickMm } = this.machine;

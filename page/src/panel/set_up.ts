@@ -30,7 +30,7 @@ interface Advice {
 
 export class SetUp {
     /** An instance for the measurements of this machine. */
-    readonly #rust = new Rust(module);
+    #rust = new Rust(module);
     #marginMm: number | null = null;
     /** The language of the steps that are shown, and their inputs by setting. */
     #language: string | undefined;
@@ -49,6 +49,14 @@ export class SetUp {
             const set = ask(`set margin_mm ${this.#marginMm}`).then(() => ask("save"));
             void parts.attempt("margin-said", set);
         });
+    }
+
+    /** Begins again, for another machine. */
+    forget(): void {
+        this.#rust = new Rust(module);
+        this.#marked.clear();
+        this.#language = undefined;
+        this.show();
     }
 
     /** Takes lines about a measurement. */

@@ -73,7 +73,8 @@ export class SettingsForm {
         } else {
             Object.assign(input, { type: "number", inputMode: "numeric", min: `${least}`, max: `${greatest}` });
             input.value = String(wanted);
-            input.addEventListener("input", () => change(input.value === "" ? Number.NaN : input.valueAsNumber));
+            // As a number, 4.000 would be 4.
+            input.addEventListener("input", () => change(/^\d+$/.test(input.value) ? Number(input.value) : Number.NaN));
         }
         const isSaved =
             saved === value
