@@ -35,7 +35,7 @@ export class Connection {
         if (why !== undefined) return;
         navigator.serial.addEventListener("connect", ({ target }) => {
             if (this.#port && !this.#isOpen && (target === this.#port || isAlike(target, this.#port)))
-                void this.connect(target as SerialPort);
+                void this.connect(target as SerialPort, true);
         });
         const update = new Update(parts, panel, async () => {
             if (panel.machine.isAtWork) {
@@ -59,8 +59,8 @@ export class Connection {
         this.#show();
     }
 
-    /** Opens a port and talks to its machine. */
-    async connect(port: SerialPort): Promise<void> {
+    /** Opens a port and talks to its machine: `isBack` if the operator has not chosen it again. */
+    async connect(port: SerialPort, isBack = false): Promise<void> {
         if (this.#isBusy) return;
         this.#isBusy = true;
         await this.#attempt(async () => {
@@ -69,6 +69,7 @@ export class Connection {
             this.#port = port;
             const line = await SerialLine.open(port, BAUD);
             this.#isOpen = true;
+            if (!isBack) this.panel.forget();
             const now = performance.now();
             this.panel.connect(sessionOver(line, now), now);
             this.#say(() => say("waitingForAnswer"));

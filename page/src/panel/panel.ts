@@ -169,6 +169,11 @@ export class Panel {
         this.#link = link;
     }
 
+    /** Forgets what was measured at another machine. */
+    forget(): void {
+        this.#setUp.forget();
+    }
+
     async disconnect(): Promise<void> {
         await this.#link?.close?.();
         this.#link = undefined;
@@ -248,6 +253,7 @@ export class Panel {
         if (!this.#holdPending && (is === "connected" || (is === "event" && happening.event.is === "state")))
             this.#parts.write("drive-said", "");
         if (is === "event") this.#calibration.take(happening.event);
+        if (is === "connected") this.#calibration.forget();
         if (is === "connected" || is === "lost") this.#showConnected();
         if (is === "connected" || is === "settings") {
             this.#settings.show();
