@@ -23,7 +23,9 @@ fn the_stack_stays_within_its_reserve() {
     let row = Planting { plants: 4, weeds: 2, ..Planting::default() }.grow(1).expect("everything has room");
     let mut run = Run::begin(Pass::at_speed(row, Machine::default(), Timing::default(), mm_s(2.5)), &[]);
     run.roll_to_the_end();
-    for command in ["status", "help", "help k", "get", "dump", "label plant", "examples", "hold", "forget all", "set k 5"] {
+    for command in
+        ["status", "help", "help k", "get", "dump", "label plant", "examples", "hold", "forget all", "set k 5"]
+    {
         ask(&mut run.uno, command);
     }
     let deepest = run.uno.deepest_stack();
