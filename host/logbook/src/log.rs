@@ -136,7 +136,12 @@ impl LogWriter {
         let lines = bytes[..whole].split(|byte| ENDS.contains(byte)).filter(|line| !line.is_empty());
         let found = lines.count().saturating_sub(1) as u64;
         let saved = file.try_clone().map_err(failed)?;
-        let disk = Disk::new(move || saved.sync_data()).map_err(failed)?;
+        let disk = Disk::new(move || match saved.sync_data() {
+            // Some file systems save by themselves, and cannot be asked.
+            Err(error) if matches!(error.kind(), ErrorKind::InvalidInput | ErrorKind::Unsupported) => Ok(()),
+            saved => saved,
+        })
+        .map_err(failed)?;
         let file = csv::Writer::from_writer(file);
         let mut log = Self { path: path.into(), file, disk, began: Instant::now(), found, added: 0 };
         if whole == 0 {
