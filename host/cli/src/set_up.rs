@@ -126,7 +126,8 @@ impl Guide {
                 self.link.ask("clear")?;
             }
             Status { alarm: Some(alarm), .. } => {
-                bail!("the machine has the alarm {}: {}; then go on", advice::name(alarm), advice::alarm(alarm))
+                let (name, advice) = (advice::name(alarm), advice::alarm(alarm));
+                bail!("the machine has the alarm {name}: {advice}. Clear it, by `weeder monitor`, then call this again")
             }
             Status { mode: Mode::Alarm, .. } => bail!("the machine has an alarm that this version does not know"),
             _ => {}

@@ -348,9 +348,12 @@ fn a_person_sets_the_virtual_uno_up_from_the_first_question_to_the_last() {
 fn without_a_machine_s_file_its_measures_are_asked_and_nothing_else_is_offered() {
     let folder = TempDir::new().expect("there is room for a folder");
     let (_uno, _) = uno(folder.path(), &["--stand", "--link", "uno"]);
-    let mut input = vec!["s", "s", "90", "s"];
+    // Step 2 with a beam that is too near at first.
+    let mut input = vec!["s", "", "300", "", "", "90", "s"];
     // Step 5 by a person's own measures, one of them out of range at first.
-    input.extend(["", "", "300", "2.5", "40", "0.2", "900", "80", "20", "15", "", "", "", "", "", "s", "s", "s"]);
+    input.extend([
+        "maybe", "", "", "300", "2.5", "40", "0.2", "900", "80", "20", "15", "", "", "", "", "", "s", "s", "s",
+    ]);
     let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
     command.current_dir(&folder).args(["set-up", "--port", "./uno"]);
     let printed = printed(&typed(&mut command, input.join("\n") + "\n"), 0);
@@ -371,8 +374,26 @@ fn without_a_machine_s_file_its_measures_are_asked_and_nothing_else_is_offered()
         );
     }
     assert!(printed.contains("it has to be a number from 0 to 200 mm"), "{printed}");
+    assert!(printed.contains("need a beam_to_tool_mm of 389 or more"), "{printed}");
+    assert!(printed.contains("error: type yes or no"), "{printed}");
     for words in ["Open: step 4, Fit a second beam: second_beam_mm is 0", "Open: step 8, Lower the margin: "] {
         assert!(printed.contains(words), "{words:?} is not in\n{printed}");
     }
     assert!(printed.contains("% of the row's ground weeded") && printed.contains("a tool of 90 mm"), "{printed}");
+}
+
+#[test]
+fn only_a_new_board_s_alarm_is_cleared_by_itself() {
+    let folder = TempDir::new().expect("there is room for a folder");
+    let (_uno, _) = uno(folder.path(), &["--stand", "--no-reset", "--link", "uno"]);
+    let mut monitor = Command::new(env!("CARGO_BIN_EXE_weeder"));
+    monitor.current_dir(&folder).args(["monitor", "--plain", "--port", "./uno"]);
+    // The switch is open, and the tool is out: a stuck tool.
+    let lines = "save\nclear\nset end_switch on\nset lead_out_ms 10\n";
+    typed(&mut monitor, lines.to_owned());
+    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
+    command.current_dir(&folder).args(["set-up", "--port", "./uno"]);
+    let output = typed(&mut command, String::new());
+    let why = String::from_utf8_lossy(&output.stderr);
+    assert!(!output.status.success() && why.contains("alarm 4-1 tool_stuck: stop;"), "{why}");
 }
