@@ -390,7 +390,7 @@ fn only_a_new_board_s_alarm_is_cleared_by_itself() {
     monitor.current_dir(&folder).args(["monitor", "--plain", "--port", "./uno"]);
     // The switch is open, and the tool is out: a stuck tool.
     let lines = "save\nclear\nset end_switch on\nset lead_out_ms 10\n";
-    typed(&mut monitor, lines.to_owned());
+    typed(&mut monitor, lines);
     let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
     command.current_dir(&folder).args(["set-up", "--port", "./uno"]);
     let output = typed(&mut command, String::new());
