@@ -10,6 +10,10 @@ use avr_device::{
 use core::convert::Infallible;
 use embedded_hal::digital::{ErrorType, InputPin, OutputPin};
 
+/// 10 ms, in which the pull-ups charge the cables, and the capacitors of debounced contacts, before the first reading. An open work
+/// switch would else be read as closed, and opening it clears an alarm.
+const PULL_UP_CYCLES: u32 = 160_000;
+
 /// The status LED on D13 (PB5), lit when high.
 pub struct Lamp<'a>(&'a portb::RegisterBlock);
 
@@ -31,9 +35,7 @@ pub struct Pins<'a> {
 pub fn pins<'a>(port_b: &'a PORTB, port_d: &'a PORTD) -> Pins<'a> {
     port_b.ddrb.modify(|_, w| w.pb5().set_bit());
     port_d.portd.modify(|_, w| w.pd4().set_bit().pd5().set_bit());
-    // 10 ms: the pull-ups first charge the cables, and the capacitors of debounced contacts. A work switch that is open would
-    // else be read as closed, and opening it clears an alarm.
-    asm::delay_cycles(160_000);
+    asm::delay_cycles(PULL_UP_CYCLES);
     Pins { lamp: Lamp(port_b), work_switch: Switch(port_d), end_switch: Switch(port_d) }
 }
 

@@ -374,6 +374,11 @@ fn a_calibration_answers_its_result_or_the_allowed_values() {
     ];
     assert_eq!(machine.ask("calibrate 10000"), answer);
     assert_eq!(machine.ask("calibrate 5000 force")[1], "ticks_per_m=3780 from 0 to 20000, default 0, not saved");
+    // The same wheel keeps its calibration, and another one does not.
+    for (line, ticks_per_m) in [("set wheel_mm 400", 3780), ("set ticks_per_rev 2400", 3780), ("set wheel_mm 401", 0)] {
+        machine.ask(line);
+        assert_eq!(machine.settings().get(Setting::TicksPerM), ticks_per_m, "{line}");
+    }
 }
 
 #[test]
@@ -394,6 +399,8 @@ fn manual_tests_are_refused_at_work_with_advice() {
         "defaults",
         "revert",
         "save",
+        "forget 1",
+        "forget all",
     ] {
         assert_eq!(machine.ask(line), ["error: the machine is at work, hold first"], "{line}");
     }

@@ -166,6 +166,18 @@ fn k(uno: &mut Uno) -> String {
 }
 
 #[test]
+fn a_work_switch_whose_line_charges_slowly_clears_no_alarm() {
+    let mut uno = Uno::boot_with_eeprom(&elf(), &[]).expect("the firmware wakes up").wired(&wiring::WIRES);
+    // It is open, and its cable and a capacitor are low for 5 ms.
+    uno.set(wiring::WORK_SWITCH, false);
+    uno.run_for_ms(5).expect("the firmware runs");
+    uno.set(wiring::WORK_SWITCH, true);
+    uno.run_for_ms(200).expect("the firmware runs");
+    let said = status(&mut uno);
+    assert_eq!(["state", "name"].map(|key| value(&said, key)), ["alarm", "settings_lost"], "{said}");
+}
+
+#[test]
 fn an_erased_eeprom_gives_the_defaults_and_an_alarm_that_is_to_be_cleared_before_work() {
     let mut uno = power_up(&elf(), &[]).expect("it wakes up");
     let said = status(&mut uno);

@@ -284,6 +284,30 @@ fn an_end_switch_that_does_not_follow_is_an_alarm() {
 }
 
 #[test]
+fn a_servo_that_dies_in_the_row_is_an_alarm_at_a_speed_at_which_each_swing_is_short() {
+    let row = Row::new((0..12).map(|number| Canopy::plant(1200.0 + 500.0 * f64::from(number), 60.0)).collect());
+    let pass = pass(row.expect("the plants stand apart"), steady(1250.0, 8000.0));
+    let mut run = Run::begin(Pass { start: Start::Now, ..pass }, &["events on"]);
+    run.uno.set(wiring::END_SWITCH, false);
+    run_for_ms(&mut run.uno, 50);
+    ask(&mut run.uno, "set end_switch on");
+    let mut place_mm = 400.0;
+    while is_out_at_the_pin(&run.uno) {
+        run.roll_to(place_mm);
+        place_mm += 5.0;
+    }
+    // It stays where it is from here on.
+    run.uno.set(wiring::END_SWITCH, true);
+    assert!(run.events("alarm").is_empty());
+    let before = run.events("swing").len();
+    assert_alarm(&mut run, "4-1 tool_stuck");
+    let swings = &run.events("swing")[before..];
+    let [out, into] = ["out", "in"].map(|tool| swings.iter().filter(|swing| value(swing, "tool") == tool).count());
+    // The alarm takes it out of the third swing in.
+    assert_eq!((out, into), (4, 3), "{swings:#?}");
+}
+
+#[test]
 fn a_beam_that_chatters_faster_than_it_can_be_heard_is_known_as_it_is_afterwards() {
     let mut uno = started();
     ask(&mut uno, "plot on");

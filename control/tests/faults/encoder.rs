@@ -10,7 +10,7 @@ use control::{
     memory::Volatile,
     operate::{event::Event, state::State, tool::Reason},
     settings::Setting,
-    units::Ticks,
+    units::{Position, Ticks},
 };
 use rig::{Beams, Rig};
 
@@ -377,5 +377,26 @@ fn jumps_count_for_a_wheel_so_fast_that_an_edge_can_be_missed() {
         let counted = drive.place.floor() as i32 - place.floor() as i32;
         let doubted = if believed { 0 } else { 2 * jumps };
         assert_eq!(drive.machine.position() - before, Ticks(counted - doubted), "{speed_m_s} m/s");
+    }
+}
+
+#[test]
+fn spikes_at_a_plant_in_the_beam_of_a_machine_that_stands_are_no_breaks() {
+    for (changes, alarm) in [(false, None), (true, Some(Alarm::EncoderSilent))] {
+        let mut drive = Drive::at_work();
+        drive.beam(true);
+        drive.roll(0.5, 0.02);
+        drive.brake(0.5);
+        drive.roll(0.0, 1.0);
+        for _ in 0..5 {
+            // An interrupt each, and a spike is over when the level is read.
+            if changes {
+                drive.beam(false);
+                drive.roll(0.0, 0.2);
+            }
+            drive.machine.edge(Position::new(drive.place.floor() as i32), Beams::one(true));
+            drive.roll(0.0, 0.2);
+        }
+        assert_eq!(drive.alarm(), alarm);
     }
 }

@@ -299,7 +299,7 @@ impl Guide {
             }
             let pushed = self.push(&wanted);
             match pushed.as_ref().map_err(Error::downcast_ref) {
-                Err(Some(error @ SettingsError::Contradiction(_))) => tell!("  error: {error}"),
+                Err(Some(error @ SettingsError::Contradiction(_))) if !wanted.is_empty() => tell!("  error: {error}"),
                 _ => return pushed,
             }
         }

@@ -9,8 +9,8 @@
 
 use crate::counted;
 use crate::decode::Operation;
-use crate::paths::{Nested, circles, entering, loops, reaching, runs_once};
-use crate::routine::{Edge, Node, Routine};
+use crate::paths::{circles, entering, loops, reaching, runs_once};
+use crate::routine::{Edge, Nested, Node, Routine};
 use crate::values::Interrupts;
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,6 +1,6 @@
 //! The graph of a routine's places: its loops, and which places can be reached from which.
 
-use crate::routine::{Edge, Node};
+use crate::routine::{Edge, Nested, Node};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The nodes from which a node with `is_end` can be reached, itself included.
@@ -65,14 +65,6 @@ fn search(start: usize, edges: Edges, seen: &mut BTreeSet<usize>, left: &mut Vec
 pub(crate) fn loops(set: &BTreeSet<usize>, edges: Edges) -> Vec<BTreeSet<usize>> {
     let is_loop = |part: &BTreeSet<usize>| part.len() > 1 || part.iter().any(|&node| edges(node).contains(&node));
     circles(set, edges).into_iter().filter(is_loop).collect()
-}
-
-/// A loop in the code of a routine.
-pub(crate) struct Nested {
-    /// The addresses in it.
-    pub(crate) places: BTreeSet<usize>,
-    /// The addresses at which it is entered.
-    pub(crate) heads: BTreeSet<usize>,
 }
 
 /// The loops in a routine's code, each before the loops within it. A place is an address here, with any stack and any

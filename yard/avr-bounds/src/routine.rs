@@ -4,7 +4,6 @@
 
 use crate::decode::{Instruction, Operation};
 use crate::effects::Registers;
-use crate::paths::Nested;
 use crate::proved::Frame;
 use crate::values::{Constants, Interrupts};
 use std::collections::BTreeSet;
@@ -89,6 +88,14 @@ impl Node {
     pub(crate) fn called(&self) -> impl Iterator<Item = &Rc<Routine>> {
         self.calls().map(|(_, called)| called)
     }
+}
+
+/// A loop in the code of a routine.
+pub(crate) struct Nested {
+    /// The addresses in it.
+    pub(crate) places: BTreeSet<usize>,
+    /// The addresses at which it is entered.
+    pub(crate) heads: BTreeSet<usize>,
 }
 
 /// A routine with all its paths.

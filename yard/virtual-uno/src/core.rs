@@ -151,6 +151,7 @@ impl Core {
             listen(request(b"uar0"), simavr::UART_IRQ_OUTPUT, on_transmit);
             let (timer, eeprom) = (&raw mut (*recorder.as_ptr()).timer, &raw mut (*recorder.as_ptr()).eeprom);
             chip.replace_writer(timer::OCR1AL, timer::on_compare_write, timer.cast());
+            chip.replace_writer(timer::ICR1L, timer::on_top_write, timer.cast());
             chip.replace_writer(timer::TCNT1L, timer::on_counter_write, timer.cast());
             chip.replace_writer(eeprom::EECR, eeprom::on_control_write, eeprom.cast());
             for vector in 1..=LAST_VECTOR {

@@ -11,10 +11,11 @@ static char level_at(uint16_t count) {
 
 int main(void) {
     DDRB = 1 << 1;
-    ICR1 = 20000 - 1;
     OCR1A = 10000 - 1;
     TCCR1A = 1 << COM1A1 | 1 << WGM11;
-    TCCR1B = 1 << WGM13 | 1 << WGM12 | 1 << CS10;
+    TCCR1B = 1 << WGM13 | 1 << WGM12;
+    ICR1 = 20000 - 1;
+    TCCR1B |= 1 << CS10;
     // The first period has no bottom behind it that sets the pin.
     while (TCNT1 < 19000)
         ;

@@ -4,10 +4,11 @@
 
 int main(void) {
     DDRB = 1 << 1;
-    ICR1 = 20000 - 1;
     OCR1A = 5000 - 1;
     TCCR1A = 1 << COM1A1 | 1 << WGM11;
-    TCCR1B = 1 << WGM13 | 1 << WGM12 | 1 << CS10;
+    TCCR1B = 1 << WGM13 | 1 << WGM12;
+    ICR1 = 20000 - 1;
+    TCCR1B |= 1 << CS10;
     while (TCNT1 < 19000)
         ;
     while (TCNT1 > 1000)

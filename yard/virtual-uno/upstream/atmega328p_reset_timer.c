@@ -20,8 +20,9 @@ int main(void) {
         finish();
     }
     TCCR1A = 1 << WGM11;
+    TCCR1B = 1 << WGM13 | 1 << WGM12;
     ICR1 = 99;
-    TCCR1B = 1 << WGM13 | 1 << WGM12 | 1 << CS10;
+    TCCR1B |= 1 << CS10;
     wdt_enable(WDTO_15MS);
     for (;;)
         ;

@@ -119,6 +119,7 @@ impl Recorder {
             self.record_level(pin, false, cycle);
         }
         self.eeprom.reset();
+        self.timer.reset();
         self.log.interrupts.reset();
         self.log.turns.reset();
         self.log.resets.push(Reset { cycle, cause });

@@ -1,4 +1,6 @@
-//! Corrections of simavr's Timer1: OCR1A and TCNT1, for output A.
+//! Corrections of simavr's Timer1: ICR1, and OCR1A and TCNT1 for output A.
+//!
+//! Only modes with ICR1 as their top take a new one (data sheet, 16.6.3).
 //!
 //! simavr's writers of OCR1A and TCNT1 are replaced. In fast PWM a new OCR1A only changes the compare value of the next
 //! period (data sheet, 16.9.3). A write of TCNT1 moves the counter. simavr's own writer does this exactly, but with the
@@ -17,12 +19,17 @@ const TCCR1A: u16 = 0x80;
 const TCCR1B: u16 = 0x81;
 pub(super) const TCNT1L: u16 = 0x84;
 const TCNT1H: u16 = 0x85;
+pub(super) const ICR1L: u16 = 0x86;
+const ICR1H: u16 = 0x87;
 pub(super) const OCR1AL: u16 = 0x88;
 const OCR1AH: u16 = 0x89;
 const TCNT2: u16 = 0xB2;
 
 /// TCCR1A: connections of the outputs; 0 is PORTB.
 const COM1: u8 = 0b1111 << 4;
+/// Bits of the mode, in TCCR1A and TCCR1B. In modes with ICR1 as their top the first is clear and the second is set.
+const WGM10: u8 = 1 << 0;
+const WGM13: u8 = 1 << 4;
 /// TCCR1B: the clock. 0 is none, and values above [`LAST_PRESCALER`] select a pin.
 const CS1: u8 = 0b111;
 const LAST_PRESCALER: u8 = 5;
@@ -32,6 +39,8 @@ pub(super) struct Timer1 {
     timer: *mut simavr::avr_timer_t,
     compare_writer: Writer,
     counter_writer: Writer,
+    /// ICR1's high byte. A write of the register leaves it in simavr's before the low byte follows.
+    top_high: u8,
     /// Cycles from the running period's bottom to the match of output A; 0 without a match.
     running_compare_cycles: u64,
 }
@@ -43,8 +52,14 @@ impl Timer1 {
             timer: chip.peripheral(TCNT1L),
             compare_writer: chip.writer(OCR1AL),
             counter_writer: chip.writer(TCNT1L),
+            top_high: 0,
             running_compare_cycles: 0,
         }
+    }
+
+    /// Applies a reset.
+    pub(super) fn reset(&mut self) {
+        self.top_high = 0;
     }
 
     /// Records a level of output A. In fast PWM it rises at the bottom, where OCR1A's buffer takes effect.
@@ -96,6 +111,20 @@ pub(super) unsafe extern "C" fn on_compare_write(avr: *mut simavr::avr_t, regist
             true => u64::from(timer.cs_div_value) * (u64::from(compare) + 1),
             false => 0,
         };
+    }
+}
+
+/// simavr's callback for a write of ICR1's low byte; the high byte is in its register. `timer1` is the chip's.
+pub(super) unsafe extern "C" fn on_top_write(avr: *mut simavr::avr_t, register: u16, low: u8, timer1: *mut c_void) {
+    // SAFETY: as in `on_compare_write`.
+    unsafe {
+        let (chip, timer1) = (Chip::of(avr), timer1.cast::<Timer1>());
+        if chip.read(TCCR1A) & WGM10 == 0 && chip.read(TCCR1B) & WGM13 != 0 {
+            (*timer1).top_high = chip.read(ICR1H);
+            chip.set(register, low);
+        } else {
+            chip.set(ICR1H, (*timer1).top_high);
+        }
     }
 }
 
