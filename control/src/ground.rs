@@ -22,6 +22,7 @@ pub mod nearest;
 pub mod reach;
 pub mod second_beam;
 pub mod slip;
+mod two_beams;
 mod unclassified;
 
 pub use self::{closed::AtTool, unclassified::Unclassified};
@@ -31,13 +32,12 @@ use self::{
     guard::Guard,
     keep_out::{Canopy, KeepOut, ScheduleFull},
     reach::{Geometry, Leads},
-    second_beam::{Blind, SecondBeam},
-    slip::SlipChange,
+    second_beam::SecondBeam,
     unclassified::Known,
 };
 use crate::{
     settings::Settings,
-    units::{Length, Position, Speed, WrappedPosition},
+    units::{Position, Speed, WrappedPosition},
 };
 
 /// The known ground around the machine.
@@ -45,6 +45,8 @@ use crate::{
 pub struct Ground {
     geometry: Geometry,
     leads: Leads,
+    /// Whether the speed or a setting has changed since the leads were calculated.
+    leads_are_old: bool,
     /// The beam's position.
     beam: WrappedPosition,
     detector: Detector,
@@ -65,6 +67,7 @@ impl Ground {
     pub const NONE: Self = Self {
         geometry: Geometry::NONE,
         leads: Leads::NONE,
+        leads_are_old: false,
         beam: WrappedPosition::new(0),
         detector: Detector::NONE,
         keep_out: KeepOut::NONE,
@@ -88,8 +91,8 @@ impl Ground {
         self.begin_here(broken);
     }
 
-    /// Recalculates the distances after a change of settings. The caller then calls [`lead`](Self::lead). A new scale makes all
-    /// positions invalid, so the ground is then forgotten.
+    /// Recalculates the distances after a change of settings. [`catch_up`](Self::catch_up) then recalculates the leads. A new scale
+    /// makes all positions invalid, so the ground is then forgotten.
     pub fn follow(&mut self, settings: &Settings, position: Position) {
         let scale = self.geometry.scale;
         let guard_spacing = self.geometry.guard_spacing();
@@ -101,78 +104,33 @@ impl Ground {
             self.beam = self.geometry.scale.wrap(position);
             self.begin_here(self.detector.is_broken());
         }
+        self.outdate_leads();
     }
 
-    /// Whether the measured slip differs from the slip that the distances use.
-    #[cfg_attr(not(target_arch = "avr"), inline)]
-    pub fn needs_correction(&self) -> bool {
-        self.corrected_by != self.second_beam.slip().present_and_last()
+    /// The measured speed has changed, and so have the leads: [`catch_up`](Self::catch_up) recalculates them.
+    #[inline(always)]
+    pub const fn outdate_leads(&mut self) {
+        self.leads_are_old = true;
     }
 
-    /// Recalculates the distances with the measured slip.
-    pub fn correct(&mut self, settings: &Settings) {
-        self.corrected_by = self.second_beam.slip().present_and_last();
-        let (excess, last) = self.corrected_by;
-        self.geometry.follow(settings, excess);
-        // A slip that is no longer trusted may still be right. The margin grows so that the zones hold for both values.
-        if self.has_second_beam() {
-            let doubted = u32::from(self.geometry.beam_to_tool().0 as u16) * u32::from(excess.abs_diff(last));
-            self.geometry.widen_margin(Length((doubted >> 8) as i16));
+    /// Recalculates the distances with the measured slip, or the [leads](Leads::at) for these speeds: each takes a large part of a
+    /// turn. Returns whether it did.
+    #[inline(always)]
+    pub fn catch_up(&mut self, settings: &Settings, speed: Speed, expected: Speed) -> bool {
+        if self.needs_correction() {
+            self.correct(settings);
+        } else if core::mem::take(&mut self.leads_are_old) {
+            self.leads = Leads::at(speed, expected, settings);
+        } else {
+            return false;
         }
-    }
-
-    /// No longer trusts the second beam's measurements: the wheel or the beams' distance may have changed. The second beam ignores
-    /// earlier detections of the first. Its level stays, because only its edges are reported, and none may come.
-    pub fn distrust_slip(&mut self) {
-        self.begin_second(self.second_is_broken());
-    }
-
-    /// The second beam starts with a level, where the first beam is.
-    #[cfg_attr(target_arch = "avr", inline(never))]
-    fn begin_second(&mut self, broken: bool) {
-        // A beam that is not there any more would stay broken.
-        self.second_beam.begin(self.detector.frontier(), broken && self.has_second_beam());
-    }
-
-    /// Recalculates the leads for another speed, see [`Leads::at`].
-    pub fn lead(&mut self, settings: &Settings, speed: Speed, expected: Speed) {
-        self.leads = Leads::at(speed, expected, settings);
+        true
     }
 
     /// Takes a beam edge and its position. Returns the detection that was complete before this edge.
     pub fn edge(&mut self, position: Position, broken: bool) -> Option<Detection> {
         let wrapped = self.geometry.scale.wrap(position) - self.leads.response;
         self.detector.edge(wrapped, broken, self.geometry.merge_gap())
-    }
-
-    /// Takes the second beam's level at a position of the machine. Returns its detection, unless a known canopy explains it.
-    pub fn match_second_beam(&mut self, position: Position, broken: bool) -> Option<Detection> {
-        let (scale, apart, merge_gap) = (self.geometry.scale, self.geometry.second_beam(), self.geometry.merge_gap());
-        let least = self.geometry.least_seen();
-        let wrapped = scale.wrap(position) - self.leads.response - apart;
-        if broken != self.second_beam.is_broken() {
-            self.widen(wrapped, wrapped);
-        }
-        let mut detection = self.second_beam.take_level(wrapped, broken, apart, merge_gap, least)?;
-        // A detection behind the last plant has no spacing, so it cannot be classified.
-        detection.cut |= !detection.leading.is_ahead_of(self.last_plant);
-        if self.widen(detection.leading, detection.trailing) {
-            return None;
-        }
-        // Only one beam saw this, so it is not certain to be a single plant.
-        self.detector.doubt();
-        Some(detection)
-    }
-
-    /// The beam that is blind, if any.
-    #[cfg_attr(not(target_arch = "avr"), inline)]
-    pub fn blind(&self) -> Option<Blind> {
-        self.second_beam.blind()
-    }
-
-    /// Announces a detection of the first beam to the second.
-    pub fn await_detection(&mut self, detection: Detection) {
-        self.second_beam.await_detection(detection, self.geometry.least_seen());
     }
 
     /// Moves the machine to a position. Returns the detection that this completes.
@@ -232,15 +190,6 @@ impl Ground {
         self.unclassified.known = Known::Nothing;
     }
 
-    /// Widens a canopy to the stretch that the second beam sees. Returns whether a canopy is there.
-    fn widen(&mut self, from: WrappedPosition, to: WrappedPosition) -> bool {
-        let within = Length(self.geometry.second_beam().0 >> 2);
-        if self.unclassified.known == Known::Canopy {
-            self.unclassified.canopy.widen(from, to, within, within);
-        }
-        self.keep_out.widen(from, to, within)
-    }
-
     /// Guards the ground of an expected plant once the beam has passed it and seen none. Returns the middle of that ground.
     ///
     /// # Errors
@@ -263,28 +212,6 @@ impl Ground {
     /// The odometer's position at a wrapped position, if `position` is the beam's.
     pub fn position_of(&self, wrapped: WrappedPosition, position: Position) -> Position {
         position + self.geometry.scale.ticks(wrapped - self.beam)
-    }
-
-    /// Whether there is a second beam.
-    #[cfg_attr(not(target_arch = "avr"), inline)]
-    pub fn has_second_beam(&self) -> bool {
-        self.geometry.second_beam() > Length::ZERO
-    }
-
-    /// The second beam's last known level.
-    #[cfg_attr(not(target_arch = "avr"), inline)]
-    pub fn second_is_broken(&self) -> bool {
-        self.second_beam.is_broken()
-    }
-
-    /// What has changed about the slip since the last call.
-    pub fn take_slip_change(&mut self) -> SlipChange {
-        self.second_beam.take_slip_change()
-    }
-
-    /// The wheel's slip in thousandths; `None` if it is unknown.
-    pub fn slip_permille(&self) -> Option<i16> {
-        self.second_beam.slip().permille()
     }
 
     /// Whether the beam has been broken for longer than the widest canopy.
@@ -310,7 +237,7 @@ impl Ground {
 mod tests {
     use super::class::Class;
     use super::*;
-    use crate::settings::Setting;
+    use crate::{settings::Setting, units::Length};
 
     const SPEED: Speed = Speed(1000);
 
@@ -334,7 +261,7 @@ mod tests {
         let mut ground = Ground::NONE;
         ground.follow(&settings, Position::new(0));
         ground.begin(Position::new(0), false);
-        ground.lead(&settings, SPEED, SPEED);
+        assert!(ground.catch_up(&settings, SPEED, SPEED));
         let canopy = pass(&mut ground, 1000, 1300);
         assert_eq!((ground.spacing(&canopy), canopy.width()), (Length(1000), Length(300)));
         keep(&mut ground, canopy);
@@ -381,7 +308,8 @@ mod tests {
     fn an_edge_lies_where_the_ground_was_when_the_beam_s_sensor_began_to_answer() {
         let (mut ground, mut settings) = ground();
         settings.set(Setting::BeamResponseMs, 10).expect("within its range");
-        ground.lead(&settings, SPEED, SPEED);
+        ground.outdate_leads();
+        assert!(ground.catch_up(&settings, SPEED, SPEED));
         ground.edge(Position::new(2000), true);
         ground.edge(Position::new(2300), false);
         assert!(!ground.is_unseen());

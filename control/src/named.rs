@@ -1,6 +1,6 @@
 //! Enums whose variants each have a text on the console.
 
-/// Defines an enum, with a text for each variant. The group of texts is in the list of `say::texts`.
+/// Defines an enum, with a text for each variant. `say::texts` lists the group of texts, and `say::names` reads it from flash.
 macro_rules! named {
     ($(#[$about:meta])* $Name:ident { $($(#[$doc:meta])* $Variant:ident = $word:literal,)* }) => {
         $(#[$about])*
@@ -23,16 +23,6 @@ macro_rules! named {
                     $(index if index == Self::$Variant as u8 => Some(Self::$Variant),)*
                     _ => None,
                 }
-            }
-
-            /// Its text.
-            pub fn text(self) -> $crate::say::Text {
-                const { $crate::say::Text::first_of(Self::WORDS) }.after(self as u8)
-            }
-
-            /// The variant with this text.
-            pub fn find(text: &[u8]) -> Option<Self> {
-                Self::from_index(const { $crate::say::Text::first_of(Self::WORDS) }.find(Self::COUNT, text))
             }
         }
     };

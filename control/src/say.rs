@@ -5,9 +5,9 @@
 //! [`Line`] once the last one is sent. [`Console`] does one small step in each turn: it reads or writes a few characters, builds a
 //! line, or runs a command. No input can stop the loop.
 //!
-//! All texts are in flash ([`packed`]), with the names of alarms and settings. No module below imports this one, except for the
-//! texts of its own names. Inside it `texts` lists what `packed` packs. Else imports run `words` -> [`command`] -> `names`, `line`
-//! -> the modules that build lines -> `answer` -> `execute` -> this file.
+//! All texts are in flash ([`packed`]), with the names of alarms and settings. No module outside imports this one. Inside it,
+//! imports run `words` -> `texts` -> [`packed`] -> [`names`] -> [`command`], [`line`] -> the modules that build lines -> `answer`
+//! -> `execute` -> this file.
 
 mod answer;
 pub mod command;

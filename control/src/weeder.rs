@@ -71,8 +71,6 @@ pub struct Controller<C, M> {
     distance: Distance,
     state: State,
     tool: Tool,
-    /// Whether the speed has changed since the leads were calculated.
-    leads_are_old: bool,
     /// Whether the machine waits for a watchdog reset: `test watchdog`.
     tests_watchdog: bool,
     /// Console lines with an error, or with lost bytes.
@@ -109,7 +107,6 @@ impl<C: Classifier, M: Memory> Uninit<C, M> {
             distance: Distance::NONE,
             state: State::Hold,
             tool: Tool::NONE,
-            leads_are_old: false,
             tests_watchdog: false,
             command_errors: 0,
             dust: 0,
@@ -254,10 +251,15 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         let doubted = self.sensors.odometer.read(position, jumps, self.believes_jumps());
         let position = self.sensors.odometer.place(position);
         self.sensors.position = position;
-        self.leads_are_old |= self.sensors.meter.read(self.sensors.now, self.ground.geometry().scale.wrap(position));
+        if self.sensors.meter.read(self.sensors.now, self.ground.geometry().scale.wrap(position)) {
+            self.ground.outdate_leads();
+        }
         match self.sensors.switch.read(self.sensors.now, switch_on) {
             // The operator clears an alarm first: with `clear`, or by turning the switch off.
-            Some(true) if matches!(self.state, State::Hold) => self.go_to_work(),
+            Some(true) if matches!(self.state, State::Hold) => {
+                self.begin_ground();
+                self.go_to_work();
+            }
             Some(false) => self.enter(State::Hold),
             _ => {}
         }
@@ -342,11 +344,12 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             // That was one.
         } else if self.configuration.has_changed() {
             self.follow_settings();
-        } else if self.ground.needs_correction() {
-            self.ground.correct(self.configuration.settings());
-        } else if self.leads_are_old {
-            self.ground.lead(self.configuration.settings(), self.sensors.meter.speed(), self.sensors.meter.expected());
-            self.leads_are_old = false;
+        } else if self.ground.catch_up(
+            self.configuration.settings(),
+            self.sensors.meter.speed(),
+            self.sensors.meter.expected(),
+        ) {
+            // The slip or the leads.
         } else if self.ground.unclassified().is_some() {
             // Last, because one detection can follow right after another.
             let vote = self.classifier.go_on();
@@ -398,6 +401,15 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     fn is_working(&self) -> bool {
         matches!(self.state, State::Work)
+    }
+
+    /// Forgets the ground before work begins. In HOLD the machine may have been turned, lifted or reversed to another row, and nothing
+    /// tells. Ground behind the frontier would count as known, and its plants would not be seen.
+    #[inline(never)]
+    pub(super) fn begin_ground(&mut self) {
+        if !self.is_working() {
+            self.ground.begin(self.sensors.position, self.sensors.beam_broken);
+        }
     }
 
     fn go_to_work(&mut self) {

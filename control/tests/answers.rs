@@ -41,21 +41,8 @@ fn settings() -> impl Iterator<Item = Setting> {
 
 #[test]
 fn every_answer_ends_in_exactly_one_ok_or_error() {
-    let mut lines: Vec<String> = [
-        "help",
-        "status",
-        "get",
-        "start",
-        "start now",
-        "hold",
-        "clear",
-        "events on",
-        "version",
-        "nonsense",
-        "set k 99",
-    ]
-    .map(str::to_owned)
-    .to_vec();
+    let mut lines = rig::every_command();
+    lines.extend(["nonsense", "set k 99"].map(str::to_owned));
     for setting in settings() {
         let name = String::from_utf8(setting.text().bytes().collect()).unwrap();
         lines.extend([

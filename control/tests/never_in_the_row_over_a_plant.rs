@@ -222,3 +222,34 @@ fn the_tool_is_in_the_row_if_nothing_keeps_it_out() {
         }
     }
 }
+
+#[test]
+fn work_begins_on_ground_that_the_beam_has_yet_to_see_unless_the_operator_keeps_it() {
+    for by in ["start", "switch", "start now"] {
+        let mut rolling = Rolling::along(Vec::new(), Vec::new(), &[]);
+        rolling.roll_to(2000.0, 500.0);
+        assert!(!rolling.machine.tool_out());
+        rolling.machine.hold();
+        // The machine turns, with reversing. Then another row lies where the beam has been.
+        rolling.roll_to(4000.0, 500.0);
+        rolling.roll_to(2625.0, 500.0);
+        let brakes = (0..).map(|turn| 500.0 - 1000.0 * TURN_S * f64::from(turn)).take_while(|speed| *speed > 0.0);
+        brakes.for_each(|speed| rolling.turn(-speed * TURN_S));
+        let plant_mm = (2700.0, 2850.0);
+        rolling.first_mm = vec![plant_mm];
+        rolling.weeded_mm.clear();
+        match by {
+            "switch" => rolling.machine.readings.switch_on = true,
+            _ => rolling.machine.start(by == "start now").unwrap(),
+        }
+        (0..200).for_each(|_| rolling.turn(0.0));
+        assert_eq!(rolling.machine.tool_out(), by != "start now", "{by}");
+        if by != "start now" {
+            rolling.roll_to(4500.0, 500.0);
+            // The command to come back leads.
+            let zone_mm = plant_mm.0 - MARGIN_MM..plant_mm.1 + MARGIN_MM - 25.0;
+            let harm_mm = rolling.weeded_mm.iter().find(|mm| **mm < 2500.0 || zone_mm.contains(mm));
+            assert!(harm_mm.is_none() && !rolling.weeded_mm.is_empty(), "{by}: {harm_mm:?}");
+        }
+    }
+}

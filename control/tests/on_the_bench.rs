@@ -40,7 +40,7 @@ fn the_servo_is_driven_directly_in_hold_only_and_the_tool_is_out_again_at_work()
 }
 
 #[test]
-fn the_lamp_shows_hold_while_the_tool_does_not_swing() {
+fn lamp_and_status_tell_a_tool_that_is_out_from_one_that_is_driven_directly() {
     let mut machine = machine();
     let lit_ms = |machine: &mut Machine| {
         let lit = (0..2000).filter(|_| {
@@ -50,8 +50,12 @@ fn the_lamp_shows_hold_while_the_tool_does_not_swing() {
         lit.count()
     };
     assert!((200..300).contains(&lit_ms(&mut machine)), "a short flash a second");
-    machine.servo_by_hand(2000).unwrap();
-    assert!((200..300).contains(&lit_ms(&mut machine)), "by hand as well");
+    assert!(machine.tool_out());
+    machine.servo_in().unwrap();
+    assert_eq!(lit_ms(&mut machine), 2000, "the tool may be in the row");
+    assert!(!machine.tool_out());
+    machine.servo_out().unwrap();
+    assert!(machine.tool_out());
 }
 
 #[test]

@@ -4,11 +4,13 @@ use crate::common::{
     Run, ask, bare_ground, is_out_at_the_pin, named, number, pass, refusal, run_for_ms, status, steady, throw_switch,
     value,
 };
+use control::alarm::Alarm;
 use field::machine::Machine;
 use field::motion::mm_s;
 use field::pass::{Pass, Start};
 use field::row::{Canopy, Row};
 use field::wiring;
+use std::fs;
 use uno::Uno;
 use uno::{CYCLES_PER_SECOND, PinChange};
 
@@ -169,4 +171,14 @@ fn the_switch_clears_an_alarm_by_going_off_and_on() {
     // The ground behind the beam is unknown after a fault: the tool waits for ground that the beam sees from there on.
     assert!(number(&after, "unseen_mm") > 400, "{after}");
     assert!(is_out_at_the_pin(&run.uno));
+}
+
+/// An alarm without a test on the ELF is a promise that nobody has seen kept.
+#[test]
+fn every_alarm_is_named_in_a_test_of_the_elf() {
+    let tests = fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/end_to_end")).expect("the tests are there");
+    let tests: String = tests.filter_map(|test| fs::read_to_string(test.expect("a file").path()).ok()).collect();
+    let names = (0..).map_while(Alarm::from_index).map(|alarm| alarm.text().to_string());
+    let untested: Vec<_> = names.filter(|name| !tests.contains(name)).collect();
+    assert!(untested.is_empty(), "{untested:?}");
 }

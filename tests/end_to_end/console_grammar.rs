@@ -20,7 +20,19 @@ fn assert_answer(uno: &mut Uno, command: &str, lines: u8) {
 }
 
 #[test]
-fn every_command_is_answered_by_its_lines_and_one_ok() {
+fn every_command_is_answered_by_one_ok_or_error() {
+    let mut uno = started();
+    // That one restarts the machine (`power_and_memory_faults`).
+    for command in rig::every_command().into_iter().filter(|command| command != "test watchdog") {
+        // A dry run would let the next commands wait for its end.
+        exchange(&mut uno, b"hold\n");
+        let answer = exchange(&mut uno, format!("{command}\n").as_bytes());
+        assert_eq!(ends(&answer), 1, "{command}: {answer:#?}");
+    }
+}
+
+#[test]
+fn a_list_is_answered_by_all_its_lines() {
     let mut uno = started();
     for (command, lines) in [
         ("help", Word::COUNT),
@@ -29,15 +41,6 @@ fn every_command_is_answered_by_its_lines_and_one_ok() {
         ("status", 2),
         ("get", Setting::COUNT),
         ("get wheel_mm", 1),
-        ("set wheel_mm 405", 0),
-        ("start", 0),
-        ("hold", 0),
-        ("start now", 0),
-        ("hold", 0),
-        ("save", 0),
-        ("clear", 0),
-        ("events on", 0),
-        ("events off", 0),
         ("  set \t wheel_mm   400  ", 0),
     ] {
         assert_answer(&mut uno, command, lines);

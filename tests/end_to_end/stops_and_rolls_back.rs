@@ -1,9 +1,12 @@
 //! Unsteady motions: the tool's position follows from the machine's position and speed, so plants are equally safe.
 
 use crate::common::{Run, number, pass};
+use field::machine::cycle_at;
 use field::motion::{Motion, mm_s};
+use field::pass::{Pass, Start};
 use field::row::{Canopy, Row};
 use field::verdict::{Judgement, Verdict};
+use field::wiring;
 
 /// Positions of the three plants, far enough apart for a swing each.
 const PLACES_MM: [f64; 3] = [800.0, 1500.0, 2200.0];
@@ -117,4 +120,34 @@ fn shunting_with_the_beam_in_a_plant_makes_one_plant_of_it() {
         motion = motion.stop_at(1300.0, 1000.0).change_speed(mm_s(1.5), 1000.0);
     }
     assert_unharmed_and_counted_once(&mut roll(motion.roll_to(2900.0)));
+}
+
+#[test]
+fn after_a_turn_with_reversing_a_plant_of_the_next_row_is_kept() {
+    let row = Row::new(vec![Canopy::plant(1300.0, 150.0)]).expect("a plant is a row");
+    let motion = Motion::starting_at(0.0)
+        .change_speed(mm_s(2.0), 1000.0)
+        .stop_at(1900.0, 1000.0)
+        .go_on_for(0.5)
+        .change_speed(-mm_s(2.0), 1000.0)
+        .stop_at(900.0, 1000.0)
+        .go_on_for(1.0)
+        .change_speed(mm_s(2.0), 1000.0)
+        .roll_to(2600.0);
+    let passing = |place_mm, number| motion.passings(place_mm).nth(number).expect("the machine comes there").time_s;
+    let (hold_s, turn_s, start_s) = (passing(1000.0, 0), passing(1890.0, 1), passing(905.0, 1) + 0.7);
+    let pass = Pass { start: Start::Now, ..pass(row, motion) };
+    // Before the turn the beam passes bare ground.
+    let mut run = Run::begin_altered(pass, &[], |start, mut changes| {
+        changes.retain(|change| change.pin != wiring::BEAM || change.cycle > cycle_at(start, turn_s));
+        changes
+    });
+    for (time_s, line) in [(hold_s, &b"hold\n"[..]), (start_s, b"start\n")] {
+        run.uno.run_until(cycle_at(run.cycles().start, time_s)).expect("the firmware runs");
+        run.uno.send(line);
+    }
+    run.roll_to_the_end();
+    let judgement = run.judgement();
+    assert_ne!(judgement.plants[0].verdict, Verdict::Damaged, "{:?}", judgement.plants);
+    assert!(run.commands().last().is_some_and(|command| !command.is_out), "it weeds behind the plant");
 }

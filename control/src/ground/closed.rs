@@ -147,7 +147,8 @@ mod tests {
             ground.roll_to(Position::new(1400));
             ground.forget();
             ground.roll_to(Position::new(1400 + margin + ahead + beam_to_tool));
-            ground.lead(&Settings::new(), Speed(-1000), Speed(-1000));
+            ground.outdate_leads();
+            assert!(ground.catch_up(&Settings::new(), Speed(-1000), Speed(-1000)));
             assert_eq!((ground.is_unseen(), ground.unseen()), (true, Length::ZERO), "it lies behind the tool");
             ground.assume_bare();
             ground.roll_to(Position::new(1400 + margin - 1 + beam_to_tool));

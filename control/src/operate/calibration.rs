@@ -46,7 +46,7 @@ impl Distance {
         }
         let length_mm = u32::from(length_mm);
         // Limited to 4 million ticks, 250 m with the finest wheel: longer than a hand-measured stretch.
-        let ticks = (position - begin).0.unsigned_abs().min(u32::MAX / 1000 - 1);
+        let ticks = (position - begin).0.unsigned_abs().min(u32::MAX / 1000 - 33);
         let counted = ((ticks * 1000 + length_mm / 2) / length_mm).min(u16::MAX.into()) as u16;
         self.counted = counted;
         // Rounded up, so that the tolerance is exact.

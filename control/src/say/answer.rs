@@ -78,7 +78,7 @@ impl Answer {
         *self = match *self {
             Self::Done | Self::Typed => return,
             Self::Greeting => {
-                line.add(texts::WEEDER);
+                line.add(names::WEEDER);
                 line.say(texts::RESET_BY);
                 line.add(controller.cause().text());
                 if controller.was_working() {
@@ -148,7 +148,7 @@ impl Answer {
                 if place + 1 < controller.detections().len() { Self::Dump(place + 1) } else { Self::Ok }
             }
             Self::Version => {
-                line.add(texts::WEEDER);
+                line.add(names::WEEDER);
                 Self::Ok
             }
             Self::Ok => {

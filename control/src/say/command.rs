@@ -5,11 +5,11 @@
 //! answers commands.
 
 use super::words::{FORCE, GRAMMAR, KIND, NOTHING, NUMBER, SETTING, VALUE};
-use crate::{named::named, settings::Setting};
+use crate::settings::Setting;
 use core::mem;
 use heapless::Vec;
 
-pub use super::words::{Action, Argument, Word};
+pub use super::words::{Action, Argument, Word, Wrong};
 
 /// Most characters of a line.
 pub const LINE_LENGTH: usize = 80;
@@ -32,25 +32,6 @@ pub struct Command {
 
 /// Speed of a dry run without an argument: 1.8 km/h.
 const TEST_SPEED_MM_S: u16 = 500;
-
-named! {
-    /// What is wrong with a line.
-    Wrong {
-        // It is 0, like memory before start-up.
-        /// Nothing, so far.
-        Nothing = "",
-        /// More than [`LINE_LENGTH`] characters.
-        TooLong = "send 80 characters at most",
-        /// Characters other than printable ASCII.
-        NotText = "send letters, digits and blanks only",
-        /// Bytes were lost before the firmware read them.
-        CharactersLost = "characters were lost, send the line again",
-        /// No command begins like this.
-        UnknownCommand = "no such command, help lists them all",
-        /// No setting has this name.
-        UnknownSetting = "no such setting, get lists them all",
-    }
-}
 
 /// Why a line is not a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

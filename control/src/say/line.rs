@@ -4,8 +4,8 @@
 //! time. Each call unpacks or divides only as far as the next character.
 
 use crate::say::{
-    packed::{Characters, Text, is_same, parts},
-    texts::GROUPS,
+    packed::{Characters, Text},
+    texts::NamedText,
 };
 use ufmt::{Formatter, uDisplay, uWrite};
 
@@ -14,28 +14,6 @@ pub const TEXTS: usize = 16;
 
 /// Most numbers of a line; the second line about the status has seven. A power of two too.
 const NUMBERS: usize = 8;
-
-/// A text that the code names. One byte numbers it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct NamedText(u8);
-
-impl NamedText {
-    /// A text of the first group.
-    pub(crate) const fn of(text: &str) -> Self {
-        let (group, mut number, mut place) = (GROUPS[0], 0, 0);
-        while !is_same(group[place], text) {
-            number += parts(group[place]);
-            place += 1;
-        }
-        assert!(number + parts(text) <= u8::MAX as usize, "one byte numbers the texts that the code names");
-        Self(number as u8)
-    }
-
-    /// The same text.
-    pub(crate) const fn text(self) -> Text {
-        Text::FIRST.after(self.0)
-    }
-}
 
 /// A line, or the rest of it.
 #[derive(Clone, Debug)]
@@ -62,7 +40,7 @@ impl Line {
             texts_begun: 0,
             numbers: 0,
             numbers_begun: 0,
-            last: NamedText(0),
+            last: NamedText::FIRST,
             text: [Text::FIRST; TEXTS],
             number: [0; NUMBERS],
         }
@@ -84,7 +62,7 @@ impl Line {
     #[inline(never)]
     pub(crate) fn word(&mut self, word: Text) {
         self.add(word);
-        self.say(NamedText(self.last.0 + 1));
+        self.say(self.last.next());
     }
 
     /// Adds a text of any group.
@@ -155,10 +133,7 @@ impl Default for Line {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        say::{lines, texts},
-        settings::Setting,
-    };
+    use crate::{say::texts, settings::Setting};
     use std::string::{String, ToString};
 
     fn written(mut line: Line) -> String {
@@ -187,12 +162,12 @@ mod tests {
         let mut line = Line::new();
         line.add(Setting::K.text());
         line.say(texts::RANGE);
-        line.say(NamedText::of(lines::LINES[2]));
+        line.say(NamedText::of(texts::LINES[2]));
         line.word(texts::NUMBER.text());
         line.say(texts::END);
         [-1, 20, 7, 8].into_iter().for_each(|number| line.number(number));
         assert!(!line.is_done());
-        assert_eq!(lines::LINES[2], "swing tool=@ pos=#");
+        assert_eq!(texts::LINES[2], "swing tool=@ pos=#");
         assert_eq!(written(line), "k from -1 to 20swing tool=7 pos=8\r\n");
     }
 

@@ -14,16 +14,16 @@ use crate::{
         state::State,
     },
     say::{
-        line::{Line, NamedText},
+        line::Line,
         packed::Text,
-        texts,
+        texts::{self, NamedText},
         words::Argument,
     },
     settings::Setting,
     weeder::Controller,
 };
 
-/// Makes the texts of the tables' lines, and the functions that write the lines.
+/// Makes the functions that write the tables' lines.
 macro_rules! write_lines {
     (
         events {$(
@@ -37,10 +37,6 @@ macro_rules! write_lines {
             })*;
         )*}
     ) => {
-        /// The lines of the tables. A line of the status has a text for each group.
-        pub(super) const LINES: &[&str] =
-            &[$(concat!($beginning, $($part,)* $($tail)?),)* $($(concat!($($word),*),)*)*];
-
         /// Builds the line of an event.
         #[inline(never)]
         pub fn write_event(event: &Event, line: &mut Line) {

@@ -1,15 +1,48 @@
-//! Names: the text of each of the machine's words that is not an enum's own.
+//! Names: the text of each of the machine's words.
 
 use crate::{
+    alarm::{Alarm, Warning},
     ground::class::{Class, label},
-    operate::state::State,
+    measure::reset::Cause,
+    operate::{command_error::CommandError, state::State, tool::Reason},
     say::{
         packed::Text,
         texts,
-        words::{Argument, Word},
+        words::{self, Argument, Word, Wrong},
     },
     settings::{self, Setting},
 };
+
+/// Reads the texts of enums that are [`named!`](crate::named) from flash.
+macro_rules! read_names {
+    ($($Name:ident)*) => {$(
+        impl $Name {
+            /// Its text.
+            pub fn text(self) -> Text {
+                const { Text::first_of(Self::WORDS) }.after(self as u8)
+            }
+
+            /// The variant with this text.
+            pub fn find(text: &[u8]) -> Option<Self> {
+                Self::from_index(const { Text::first_of(Self::WORDS) }.find(Self::COUNT, text))
+            }
+        }
+    )*};
+}
+
+read_names! { Alarm Argument Cause CommandError Reason Setting Warning Word Wrong }
+
+impl Word {
+    /// Its arguments, each after a blank.
+    pub(crate) fn takes(self) -> Text {
+        const { Text::first_of(words::TAKES) }.after(self as u8)
+    }
+
+    /// Its help text.
+    pub(crate) fn help(self) -> Text {
+        const { Text::first_of(words::HELPS) }.after(self as u8)
+    }
+}
 
 impl Setting {
     /// Its help text.
@@ -22,6 +55,9 @@ impl Setting {
         const { Text::first_of(settings::UNITS) }.after(self as u8)
     }
 }
+
+/// The firmware's name and version.
+pub(super) const WEEDER: Text = Text::first_of(&[texts::UNPACKED]);
 
 /// The state's name.
 #[inline(never)]

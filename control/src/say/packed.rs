@@ -25,7 +25,7 @@
 //! - Nothing proves that these fragments give the smallest table. A test holds that packing saves at least a third.
 //! - Two simulators have printed the console's answers. No real board has.
 
-use crate::say::texts::{GROUPS, UNPACKED};
+use crate::say::texts::{GROUPS, NamedText, UNPACKED, WORD, is_same, parts};
 
 /// A text in flash: its group, and its place there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,9 +46,6 @@ pub const HALVINGS: usize = 4;
 /// Bits of a text's header with its packed length. The other two are its [`mark`], which excludes most words in a search without
 /// unpacking them.
 const LENGTH: u8 = 0x3F;
-
-/// Stands for a word in a text.
-const WORD: u8 = b'@';
 
 /// No code: during packing it ends a text, or the part of a text before a word.
 const END: u8 = u8::MAX;
@@ -215,16 +212,6 @@ const PACKED: Packed = {
     Packed { table, length: end, letters, index }
 };
 
-/// The parts of a text before, between and behind its words.
-pub(super) const fn parts(text: &str) -> usize {
-    let (mut parts, mut at) = (1, 0);
-    while at < text.len() {
-        parts += (text.as_bytes()[at] == WORD) as usize;
-        at += 1;
-    }
-    parts
-}
-
 /// The number of texts in the largest group.
 pub const LARGEST_GROUP: usize = {
     let (mut largest, mut group) = (0, 0);
@@ -261,6 +248,13 @@ avr_progmem::progmem! {
 #[inline(never)]
 fn byte(place: usize) -> u8 {
     flash::byte(&TABLE, place)
+}
+
+impl NamedText {
+    /// The same text.
+    pub(crate) const fn text(self) -> Text {
+        Text::FIRST.after(self.0)
+    }
 }
 
 impl Text {
@@ -327,14 +321,6 @@ impl Text {
 const fn is_same_group(one: &[&str], other: &[&str]) -> bool {
     let mut same = 0;
     while same < one.len() && same < other.len() && is_same(one[same], other[same]) {
-        same += 1;
-    }
-    same == one.len() && same == other.len()
-}
-
-pub(super) const fn is_same(one: &str, other: &str) -> bool {
-    let (one, other, mut same) = (one.as_bytes(), other.as_bytes(), 0);
-    while same < one.len() && same < other.len() && one[same] == other[same] {
         same += 1;
     }
     same == one.len() && same == other.len()

@@ -152,3 +152,22 @@ named! {
         Weed = "weed",
     }
 }
+
+named! {
+    /// What is wrong with a line.
+    Wrong {
+        // It is 0, like memory before start-up.
+        /// Nothing, so far.
+        Nothing = "",
+        /// More than [`LINE_LENGTH`](super::command::LINE_LENGTH) characters.
+        TooLong = "send 80 characters at most",
+        /// Characters other than printable ASCII.
+        NotText = "send letters, digits and blanks only",
+        /// Bytes were lost before the firmware read them.
+        CharactersLost = "characters were lost, send the line again",
+        /// No command begins like this.
+        UnknownCommand = "no such command, help lists them all",
+        /// No setting has this name.
+        UnknownSetting = "no such setting, get lists them all",
+    }
+}

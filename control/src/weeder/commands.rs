@@ -11,7 +11,8 @@ use crate::{
 use knn::Example;
 
 impl<C: Classifier, M: Memory> Controller<C, M> {
-    /// Goes to work. With `now`, the tool may also enter ground that the beam has not seen.
+    /// Goes to work, on ground that the beam has yet to see. With `now`, the tool may enter at once: ground seen before stays known,
+    /// and other ground counts as bare.
     ///
     /// # Errors
     /// [`CommandError::AlarmLatched`], and a [`Contradiction`](crate::settings::Contradiction) between settings.
@@ -25,6 +26,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         }
         if now {
             self.ground.assume_bare();
+        } else {
+            self.begin_ground();
         }
         self.go_to_work();
         Ok(())
@@ -82,7 +85,6 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             self.ground.distrust_slip();
         }
         self.limits = Limits::of(settings, self.ground.geometry().wheel, self.ground.geometry().scale);
-        self.leads_are_old = true;
     }
 
     /// Starts to save the settings; [`carry_on`](Self::carry_on) finishes it.

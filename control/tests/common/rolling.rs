@@ -34,7 +34,7 @@ pub struct Rolling {
     pub told: Vec<(Event, f64)>,
     wheel_mm: f64,
     /// The stretches that each beam sees, from and to.
-    first_mm: Vec<(f64, f64)>,
+    pub first_mm: Vec<(f64, f64)>,
     second_mm: Vec<(f64, f64)>,
     /// How far the second beam and the tool are behind the first.
     second_beam_mm: f64,

@@ -15,7 +15,8 @@ use control::measure::readings::{Edge, Readings, Startup};
 use control::measure::reset::Cause;
 use control::memory::{Memory, SIZE, Volatile};
 use control::operate::event::Event;
-use control::say::{self, LINE, command::LineBuffer, line::Line};
+use control::say::command::{Argument, LineBuffer, Word, parse};
+use control::say::{self, LINE, line::Line};
 use control::settings::{Setting, Settings};
 use control::units::{Instant, Interval, Position};
 use control::weeder::{Controller, Orders};
@@ -34,6 +35,18 @@ pub fn settings(changes: &[(Setting, u16)]) -> Settings {
         settings.set(setting, value).expect("it is within its range");
     }
     settings
+}
+
+/// Every line that the console's grammar takes, with a setting and with numbers.
+pub fn every_command() -> Vec<String> {
+    let arguments = (0..).map_while(Argument::from_index).map(|argument| argument.text().to_string());
+    let follow: Vec<_> = arguments.chain(["1", "1000", "k"].map(str::to_owned)).collect();
+    let with_another = |line: &String| follow.iter().map(|word| format!("{line} {word}")).collect::<Vec<_>>();
+    let words: Vec<_> = (0..).map_while(Word::from_index).map(|word| word.text().to_string()).collect();
+    let twos: Vec<_> = words.iter().flat_map(with_another).collect();
+    let threes: Vec<_> = twos.iter().flat_map(with_another).collect();
+    let lines = words.into_iter().chain(twos).chain(threes);
+    lines.filter(|line| parse(line.as_bytes()).is_ok()).collect()
 }
 
 /// Which of the beams are broken.

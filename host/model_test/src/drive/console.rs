@@ -66,7 +66,9 @@ impl<M: Machine> Drive<M> {
             self.begin(&line, before);
             if M::IS_OPEN {
                 self.check_begun(&line, before)?;
-                if self.machine.state() == State::Work {
+                let works = self.machine.state() == State::Work;
+                self.expectations.follow_work(works, words(&line) == ["start", "now"], self.here());
+                if works {
                     self.trust(&line, unseen_mm);
                 }
             }
@@ -78,7 +80,11 @@ impl<M: Machine> Drive<M> {
         for end in written.iter().filter(|line| is_end(line)) {
             self.end(end, unseen_mm);
         }
-        written.iter().try_for_each(|line| self.hear(line))
+        written.iter().try_for_each(|line| self.hear(line))?;
+        if self.machine.state() != before {
+            self.expectations.follow_work(self.machine.state() == State::Work, false, self.here());
+        }
+        Ok(())
     }
 
     /// A line is executed, now or soon.
@@ -121,6 +127,11 @@ impl<M: Machine> Drive<M> {
         }
         if !M::IS_OPEN && is_ok {
             *is_tried &= !matches!(words[..], ["hold"] | ["servo", "out"] | ["start", ..]);
+            match words[..] {
+                ["start", ..] => self.expectations.follow_work(true, words.len() > 1, self.here()),
+                ["hold" | "clear"] => self.expectations.works = false,
+                _ => {}
+            }
             self.trust(&line, unseen_mm);
         }
     }

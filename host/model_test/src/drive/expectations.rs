@@ -51,6 +51,8 @@ pub(super) struct Expectations {
     was_in_row: bool,
     /// The time and position at which the tool was first seen in the row over a canopy: it may be on its way out.
     suspect: Option<(u64, Place)>,
+    /// Whether the machine works, as far as is known.
+    pub(super) works: bool,
     /// Whether a test on the bench is running, so that the tool may be in the row.
     pub(super) is_tried: bool,
     /// Turns in which the tool was out for a plant that the model does not know.
@@ -86,8 +88,17 @@ impl Expectations {
         // The measured speed is 0 until the first measurement.
         self.speeds = Speeds::default();
         self.speeds.take(world.time_us, 0.0);
-        (self.suspect, self.is_tried, self.had_second_beam) = (None, false, false);
+        (self.suspect, self.works, self.is_tried, self.had_second_beam) = (None, false, false, false);
         self.disturb(world.time_us);
+    }
+
+    /// The machine works or not, with the beam at a position. Work begins on ground that the beam has yet to see, except after
+    /// `start now`.
+    pub(super) fn follow_work(&mut self, works: bool, keeps_ground: bool, here: i64) {
+        if works && !self.works && !keeps_ground {
+            self.model.see_again(here);
+        }
+        self.works = works;
     }
 
     /// Ends a steady stretch.
@@ -277,6 +288,7 @@ impl<M: Machine> Drive<M> {
         }
         physics.out_since_us = machine.is_sent_out().then(|| physics.out_since_us.unwrap_or(now_us));
         if state != state_before {
+            expectations.follow_work(state == State::Work, false, position);
             expectations.disturb(now_us);
             if let Some(stand) = expectations.stand.as_mut().filter(|_| is_alarm(state)) {
                 stand.forget(now_us, &physics.geometry(machine));

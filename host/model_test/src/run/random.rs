@@ -1,53 +1,24 @@
 //! Random runs: the strategies that draw the machine, the row and the steps.
 
-use super::{Beginning, Classification, Encoder, PLANT_MM, Run, Sight, Step, TEST_WATCHDOG};
+use super::{Beginning, Classification, Encoder, PLANT_MM, Run, Sight, Step};
 use control::{
     measure::reset::Cause,
     settings::{SECOND_BEAM_LEAST_MM, Setting},
 };
 use field::wheel::most_slip;
-use proptest::prelude::*;
-use std::ops::Range;
+use proptest::{prelude::*, strategy::Union};
+use std::ops::{Range, RangeInclusive};
 
 /// Delay of the measured speed.
 const MEASURED_WITHIN_S: f64 = 0.05;
 
 /// Every command with every argument, and lines that are not commands.
 fn line() -> BoxedStrategy<String> {
-    let fixed = [
-        "status",
-        "help",
+    let others = [
         "help margin_mm",
-        "get",
         "get lead_out_ms",
-        "save",
-        "revert",
-        "defaults",
-        "calibrate start",
-        "calibrate 1000",
-        "calibrate 1000 force",
-        "calibrate servo",
-        "servo in",
-        "servo out",
         "servo 1750",
         "servo 9999",
-        "test row",
-        TEST_WATCHDOG,
-        "start",
-        "start now",
-        "hold",
-        "clear",
-        "events on",
-        "events off",
-        "plot on",
-        "plot teleplot",
-        "plot off",
-        "label plant",
-        "label weed",
-        "examples",
-        "forget all",
-        "dump",
-        "version",
         "hepl",
         "set k",
         "set wheel 400",
@@ -57,8 +28,9 @@ fn line() -> BoxedStrategy<String> {
         "\u{1b}[A",
         "set k 3\nhold\r\nstart\n\nget k",
     ];
+    let fixed: Vec<_> = rig::every_command().into_iter().chain(others.map(str::to_owned)).collect();
     prop_oneof![
-        8 => prop::sample::select(fixed.map(str::to_owned).to_vec()),
+        8 => prop::sample::select(fixed),
         1 => (1000_u32..5000, any::<bool>())
             .prop_map(|(mm, force)| format!("calibrate {mm}{}", if force { " force" } else { "" })),
         1 => (90_u32..1500).prop_map(|mm_s| format!("test row {mm_s}")),
@@ -73,39 +45,48 @@ fn line() -> BoxedStrategy<String> {
     .boxed()
 }
 
+/// How often a setting is set, and its values on practical machines.
+fn usual(setting: Setting) -> (u32, RangeInclusive<u32>) {
+    use Setting::*;
+    match setting {
+        LeadOutMs => (4, 0..=500),
+        LeadInMs => (4, 0..=500),
+        TopSpeedMmS => (3, 300..=1600),
+        MarginMm => (2, 0..=200),
+        StemZoneMm => (2, 0..=200),
+        BeamToToolMm => (2, 100..=900),
+        MergeGapMm => (2, 0..=160),
+        MaxWidthMm => (2, 200..=1500),
+        TicksPerM => (1, 1500..=2500),
+        WheelMm => (1, 300..=600),
+        EndSwitch => (1, 0..=1),
+        BeamResponseMs => (1, 0..=5),
+        ServoGapMs => (1, 0..=15),
+        NoPlantM => (1, 0..=3),
+        ServoOutUs => (1, 500..=2500),
+        ServoInUs => (1, 500..=2500),
+        GuardSpacingMm => (2, 0..=700),
+        GuardScatterMm => (1, 0..=100),
+        SecondBeamMm => (1, 0..=300),
+        MinWidthMm => (1, 0..=60),
+        MisfitAfter => (1, 0..=6),
+        K => (1, 1..=15),
+        TicksPerRev => (1, 2000..=3000),
+    }
+}
+
 /// Settings of practical machines, and now and then of others.
 fn setting() -> BoxedStrategy<String> {
-    let usual = prop_oneof![
-        4 => (Just("lead_out_ms"), 0_u32..=500),
-        4 => (Just("lead_in_ms"), 0_u32..=500),
-        3 => (Just("top_speed_mm_s"), 300_u32..=1600),
-        2 => (Just("margin_mm"), 0_u32..=200),
-        2 => (Just("stem_zone_mm"), 0_u32..=200),
-        2 => (Just("beam_to_tool_mm"), 100_u32..=900),
-        2 => (Just("merge_gap_mm"), 0_u32..=160),
-        2 => (Just("max_width_mm"), 200_u32..=1500),
-        1 => (Just("ticks_per_m"), 1500_u32..=2500),
-        1 => (Just("wheel_mm"), 300_u32..=600),
-        1 => (Just("end_switch"), 0_u32..=1),
-        1 => (Just("beam_response_ms"), 0_u32..=5),
-        1 => (Just("servo_gap_ms"), 0_u32..=15),
-        1 => (Just("no_plant_m"), 0_u32..=3),
-        1 => (Just("servo_out_us"), 500_u32..=2500),
-        1 => (Just("servo_in_us"), 500_u32..=2500),
-        2 => (Just("guard_spacing_mm"), 0_u32..=700),
-        1 => (Just("guard_scatter_mm"), 0_u32..=100),
-        1 => (Just("second_beam_mm"), 0_u32..=300),
-        1 => (Just("min_width_mm"), 0_u32..=60),
-        1 => (Just("misfit_after"), 0_u32..=6),
-        1 => (Just("k"), 1_u32..=15),
-    ];
-    let names: Vec<_> = Setting::all().map(|setting| setting.text().to_string()).collect();
-    let any = (prop::sample::select(names), prop_oneof![0_u32..=600, 0_u32..=70_000]);
+    let usual = Setting::all().map(|setting| {
+        let (weight, values) = usual(setting);
+        (weight, (Just(setting), values).boxed())
+    });
+    let any = (prop::sample::select(Setting::all().collect::<Vec<_>>()), prop_oneof![0_u32..=600, 0_u32..=70_000]);
     // With fewer ticks a metre the machine never knows its position well enough to weed.
-    let any =
-        any.prop_filter("a wheel that counts", |(name, value)| name != "ticks_per_m" || !(1..400).contains(value));
-    let usual = usual.prop_map(|(name, value)| (name.to_owned(), value));
-    prop_oneof![9 => usual, 1 => any].prop_map(|(name, value)| format!("set {name} {value}")).boxed()
+    let counts = |(setting, value): &_| *setting != Setting::TicksPerM || !(1..400).contains(value);
+    prop_oneof![9 => Union::new_weighted(usual.collect()), 1 => any.prop_filter("a wheel that counts", counts)]
+        .prop_map(|(setting, value)| format!("set {} {value}", setting.text()))
+        .boxed()
 }
 
 /// Rolls for a time at a speed.
