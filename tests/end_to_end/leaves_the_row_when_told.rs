@@ -53,11 +53,13 @@ fn the_switch_puts_the_tool_out_at_once() {
 }
 
 #[test]
-fn the_row_is_watched_in_hold_so_that_work_goes_on_where_it_is() {
-    let mut run = weeding(Start::Now);
-    run.uno.send(b"hold\n");
-    run.roll_to(1500.0);
-    run.uno.send(b"start\n");
-    run_for_ms(&mut run.uno, 30);
-    assert!(!is_out_at_the_pin(&run.uno));
+fn the_row_is_watched_in_hold_so_that_start_now_goes_on_where_the_machine_is() {
+    for (line, is_out) in [(&b"start now\n"[..], false), (b"start\n", true)] {
+        let mut run = weeding(Start::Now);
+        run.uno.send(b"hold\n");
+        run.roll_to(1500.0);
+        run.uno.send(line);
+        run_for_ms(&mut run.uno, 30);
+        assert_eq!(is_out_at_the_pin(&run.uno), is_out);
+    }
 }

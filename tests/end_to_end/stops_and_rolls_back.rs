@@ -149,5 +149,7 @@ fn after_a_turn_with_reversing_a_plant_of_the_next_row_is_kept() {
     run.roll_to_the_end();
     let judgement = run.judgement();
     assert_ne!(judgement.plants[0].verdict, Verdict::Damaged, "{:?}", judgement.plants);
-    assert!(run.commands().last().is_some_and(|command| !command.is_out), "it weeds behind the plant");
+    let start = cycle_at(run.cycles().start, start_s);
+    let commands = run.commands();
+    assert!(commands.iter().any(|command| command.rise_cycle > start && !command.is_out), "it weeds the next row");
 }

@@ -37,7 +37,7 @@ fn a_switch_that_is_on_at_power_up_starts_nothing_until_it_has_been_off() {
     let mut uno = boot(&elf(), &[PinChange { cycle: 0, pin: wiring::WORK_SWITCH, high: false }]).expect("it wakes up");
     run_for_ms(&mut uno, 200);
     assert_in_hold_with_tool_out(&mut uno);
-    // Farther than from the beam to the tool, so that the tool could go into the row.
+    // Farther than from the beam to the tool and a margin, so that the tool could go into the row.
     roll(&mut uno, 600.0);
     assert_in_hold_with_tool_out(&mut uno);
     throw_switch(&mut uno, false);
@@ -45,7 +45,7 @@ fn a_switch_that_is_on_at_power_up_starts_nothing_until_it_has_been_off() {
     assert!(uno.pulses(wiring::SERVO).iter().all(|pulse| (pulse.width_us() - 2000.0).abs() < 0.1));
 
     throw_switch(&mut uno, true);
-    run_for_ms(&mut uno, FRAME_MS);
+    roll(&mut uno, 600.0);
     let status = status(&mut uno);
     assert_eq!((value(&status, "state"), value(&status, "tool")), ("work", "in"), "{status}");
     assert!(!is_out_at_the_pin(&uno));
