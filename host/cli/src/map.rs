@@ -5,11 +5,10 @@ use anyhow::Result;
 use clap::Args;
 use comfy_table::{Table, presets};
 use frame::{OutName, Replace, number_within, print, say, source, tell};
-use gps::job::{self, Wanted};
 use gps::summary::{Stand, Summary};
 use gps::wheel::Ratio;
-use gps::{Job, map, picture};
-use logbook::log;
+use gps::{Job, Wanted, map, picture};
+use logbook::log::{self, Kind};
 use serde_json::json;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -61,12 +60,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let svg = arguments.svg.as_ref().map(|svg| svg.file(replace)).transpose()?;
     let table = arguments.table.as_ref().map(|table| table.file(replace)).transpose()?;
     let stand = Stand { row_spacing_mm: arguments.row_spacing, spacing_mm: arguments.spacing };
-    let mut jobs = Vec::new();
+    let over = |antenna| arguments.antenna.over(antenna);
+    let wanted = Wanted { antenna: &over, longest_outage_m: arguments.longest_outage };
+    let (mut jobs, mut has_receiver) = (Vec::new(), false);
     for path in &arguments.logs {
         let log = log::read(path)?;
-        let antenna = arguments.antenna.over(job::antenna_of(&log).unwrap_or_default());
-        let wanted = Wanted { antenna: Some(antenna), longest_outage_m: arguments.longest_outage };
-        jobs.push((name(path), Job::read(&log, &wanted)));
+        has_receiver |= log.iter().any(|entry| matches!(entry.kind, Kind::GpsFound | Kind::Gps | Kind::GpsDamaged));
+        jobs.push((name(path, &arguments.logs), Job::read(&log, &wanted)));
     }
     let counted: Vec<(&str, Summary)> =
         jobs.iter().map(|(name, job)| (name.as_str(), Summary::of(job, &stand))).collect();
@@ -90,7 +90,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         table.write(|to| write_csv(&counted, to))?;
     }
     if counted.iter().all(|(_, summary)| summary.fixes == 0) {
-        tell!("The records have no fix, so no event has a position: `weeder record --gps PORT` records a receiver");
+        let advice = if has_receiver {
+            "see the lines `gps_mark` and `gps_damaged` of the receiver"
+        } else {
+            "`weeder record --gps PORT` records a receiver"
+        };
+        tell!("The records have no fix, so no event has a position: {advice}");
     }
     for (record, summary) in &counted {
         for problem in problems(summary) {
@@ -125,9 +130,11 @@ fn problems(summary: &Summary) -> Vec<String> {
     problems
 }
 
-/// A log's name on the map: its file's name.
-fn name(path: &Path) -> String {
-    path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
+/// A log's name on the map: its file's name, or its path if another of the logs has that name.
+fn name(path: &Path, logs: &[PathBuf]) -> String {
+    let is_only = logs.iter().filter(|log| log.file_name() == path.file_name()).count() == 1;
+    let name = path.file_name().filter(|_| is_only);
+    name.map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
 }
 
 /// The counts in words, as a table.

@@ -48,13 +48,13 @@ impl NamesFile {
         Ok(Names::read(&path)?)
     }
 
-    /// The board of the row with this name, or else the one at this port. A path is no name, and needs no file of names.
-    fn board(&self, port: &str) -> Result<Board> {
-        let at_port = || Board::Port(port.to_owned());
+    /// The row with this name, or else the one at this port. A path is no name, and needs no file of names.
+    fn row(&self, port: &str) -> Result<Row> {
+        let at_port = || Row { name: name_at(port), board: Board::Port(port.to_owned()) };
         if port.contains(['/', '\\']) {
             return Ok(at_port());
         }
-        Ok(self.read()?.find(port).map_or_else(at_port, |row| row.board.clone()))
+        Ok(self.read()?.find(port).cloned().unwrap_or_else(at_port))
     }
 }
 
@@ -86,7 +86,7 @@ impl Port {
     /// The board there. Fails if the file of the names cannot be read.
     pub fn board(&self) -> Result<Board> {
         match &self.port {
-            Some(port) => self.names.board(port),
+            Some(port) => Ok(self.names.row(port)?.board),
             None => Ok(Board::Only { beside: None }),
         }
     }
@@ -122,9 +122,9 @@ pub fn named(text: &str) -> Result<Named, String> {
     }
 }
 
-/// The number of the row with this name. Fails with the names that there are, in words.
+/// The number of the row with this name, in small or capital letters. Fails with the names that there are, in words.
 pub fn find(name: &str, names: &[String]) -> Result<usize, String> {
-    let found = names.iter().position(|known| known == name);
+    let found = names.iter().position(|known| known.to_lowercase() == name.to_lowercase());
     found.ok_or_else(|| format!("there is no row {name}: there are {}", names.join(", ")))
 }
 
@@ -160,16 +160,20 @@ impl Ports {
 
 /// The row of a `--port`.
 fn row(machine: &Named, names: &NamesFile) -> Result<Row> {
-    let board = names.board(&machine.port)?;
-    let name = machine.name.clone().unwrap_or_else(|| end_of(&machine.port));
+    let Row { name, board } = names.row(&machine.port)?;
+    let name = machine.name.clone().unwrap_or(name);
     if let Some(problem) = wrong_with(&name) {
         bail!("{name:?} cannot be a row's name: {problem}: put one before it, as left={}", machine.port);
     }
     Ok(Row { name, board })
 }
 
-fn end_of(port: &str) -> String {
-    Path::new(port).file_name().unwrap_or_default().to_string_lossy().into_owned()
+/// The name of the row at a port, if the user gave none: the port's end, such as ttyACM0. Windows keeps COM3.csv for
+/// the port, so that row is Uno-COM3.
+fn name_at(port: &str) -> String {
+    let end = Path::new(port).file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let longer = format!("Uno-{end}");
+    if wrong_with(&end).is_some() && wrong_with(&longer).is_none() { longer } else { end }
 }
 
 /// The Unos that control no row with a name.
@@ -181,7 +185,7 @@ pub fn unnamed<'a>(names: &'a Names, unos: &'a [Plugged]) -> impl Iterator<Item 
 fn every_row(names: &Names, beside: Option<&str>) -> Result<Vec<Row>> {
     let (mut rows, mut unos) = (names.rows().to_vec(), plugged()?);
     unos.retain(|uno| beside.is_none_or(|beside| !link::is_same(&uno.port, beside)));
-    rows.extend(unnamed(names, &unos).map(|uno| Row { name: end_of(&uno.port), board: uno.board.clone() }));
+    rows.extend(unnamed(names, &unos).map(|uno| Row { name: name_at(&uno.port), board: uno.board.clone() }));
     ensure!(
         !rows.is_empty(),
         "there is no Uno at any USB port, and {} names no row: plug them in, or name their ports by --port",
@@ -265,6 +269,8 @@ mod tests {
         for (text, name, port) in [
             ("/dev/ttyACM0", "ttyACM0", "/dev/ttyACM0"),
             ("uno", "uno", "uno"),
+            ("COM3", "Uno-COM3", "COM3"),
+            ("COM12", "COM12", "COM12"),
             ("left=/dev/ttyACM0", "left", "/dev/ttyACM0"),
             ("row 3 = left=COM3", "row 3", " left=COM3"),
         ] {
@@ -293,7 +299,7 @@ mod tests {
         let left = Board::SerialNumber("A1".to_owned());
         names.name("left", left.clone()).unwrap();
         names.write().unwrap();
-        let chosen = choose(&["left", "./left2", "hedge=right"], &file).unwrap();
+        let chosen = choose(&["Left", "./left2", "hedge=right"], &file).unwrap();
         let boards: Vec<(&str, &Board)> = chosen.rows.iter().map(|row| (row.name.as_str(), &row.board)).collect();
         assert_eq!(boards, [("left", &left), ("left2", &at("./left2")), ("hedge", &at("right"))]);
         assert_eq!(chosen.under_name(0, "lost"), "left: lost");

@@ -1,10 +1,11 @@
 //! `weeder rows`: lists the Unos and the rows that they control, and finds them again at other ports.
 
 use crate::ports::{NamesFile, unnamed};
-use anyhow::Result;
+use anyhow::{Result, anyhow};
 use clap::{Args, Subcommand};
 use comfy_table::{Table, presets};
 use frame::say;
+use link::LinkError;
 use link::row_names::{Board, Names, Plugged, plugged};
 use serde_json::{Value, json};
 
@@ -59,10 +60,17 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     match &arguments.action {
         None => list(&arguments.file.read()?, arguments.json),
         Some(Action::Name { name, port, file }) => {
-            let board = Board::at(port)?;
+            let board = Board::at(port).map_err(|error| match error {
+                LinkError::Absent(port) => anyhow!("there is no port {port}: `weeder rows` lists the connected Unos"),
+                other => other.into(),
+            })?;
             let mut names = Names::read(&file.path()?)?;
+            let before = names.rows().iter().find(|row| row.board == board && row.name != *name).cloned();
             names.name(name, board.clone())?;
             names.write()?;
+            if let Some(before) = before {
+                say!("{} is forgotten: it was this board", before.name)?;
+            }
             say!("{name} is {}, in {}", described(&board), names.path().display())
         }
         Some(Action::Forget { name, file }) => {

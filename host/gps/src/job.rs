@@ -9,7 +9,8 @@
 //! - A swing or an alarm has the tool's position at the time of its event. A swing is the command: the tool follows
 //!   after the lead.
 //! - Ground is weeded if the machine is at work and the tool is commanded into the row. It is not weeded if the tool is
-//!   commanded out. Ground counts once: passing it again after rolling back adds nothing.
+//!   commanded out. Ground counts once: passing it again after rolling back adds nothing. But a machine that rolls back
+//!   more than 2 m in hold is in another row. Over a gap of the statuses the work is unknown, and no ground counts.
 //! - A restart at work is where the machine was at its last status. The ground behind it is not weeded.
 //! - A label is the class that the operator gave the last detection, if the machine accepted it.
 
@@ -29,17 +30,17 @@ use std::ops::Range;
 use strum::IntoStaticStr;
 
 /// The parameters of reading a log.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Wanted {
-    /// The offsets of beam and tool, instead of the log's.
-    pub antenna: Option<Antenna>,
+#[derive(Clone, Copy)]
+pub struct Wanted<'a> {
+    /// Replaces a session's offsets of beam and tool.
+    pub antenna: &'a dyn Fn(Antenna) -> Antenna,
     /// The longest distance between two fixes for interpolation, in metres.
     pub longest_outage_m: f64,
 }
 
-impl Default for Wanted {
+impl Default for Wanted<'_> {
     fn default() -> Self {
-        Self { antenna: None, longest_outage_m: 20.0 }
+        Self { antenna: &|antenna| antenna, longest_outage_m: 20.0 }
     }
 }
 
@@ -168,7 +169,7 @@ pub struct Job {
     pub unplugged: u64,
     /// For each session, the midnight from which [`Found::utc_ms`] counts.
     midnights_ms: Vec<Option<i64>>,
-    /// The offsets of beam and tool that were used.
+    /// The offsets of beam and tool that were used in the last session.
     pub antenna: Antenna,
     /// The wheel's distance against the receiver's, for each straight stretch.
     pub ratios: Vec<Ratio>,
@@ -178,8 +179,8 @@ pub struct Job {
 
 impl Job {
     /// Reads a record.
-    pub fn read(log: &[Entry], wanted: &Wanted) -> Self {
-        let antenna = wanted.antenna.or_else(|| antenna_of(log)).unwrap_or_default();
+    pub fn read(log: &[Entry], wanted: &Wanted<'_>) -> Self {
+        let antenna = (wanted.antenna)(Antenna::default());
         let mut job = Self { antenna, ..Self::default() };
         let mut receiver = Receiver::new(antenna.error_m());
         let (mut follower, mut reading) = (Follower::default(), Reading::default());
@@ -187,8 +188,10 @@ impl Job {
             let tick_mm = follower.tick_mm();
             let followed = follower.take(entry);
             let is_cut = matches!(followed, Followed::Linked | Followed::Status(_, false));
-            // An earlier time: the log was closed, and opened again.
-            let is_opened = reading.time_ms.as_ref().is_some_and(|range| entry.time_ms < range.end);
+            let antenna = if entry.kind == Kind::Antenna { Antenna::parse(&entry.text) } else { None };
+            // An earlier time, or an antenna's line: the log was closed, and opened again.
+            let is_opened =
+                antenna.is_some() || reading.time_ms.as_ref().is_some_and(|range| entry.time_ms < range.end);
             if is_cut || is_opened {
                 if matches!(followed, Followed::Linked) {
                     reading.restart(entry, &log[at..]);
@@ -197,6 +200,10 @@ impl Job {
             }
             if is_opened {
                 receiver.log_opened();
+            }
+            if let Some(antenna) = antenna {
+                job.antenna = (wanted.antenna)(antenna);
+                receiver.error_m = job.antenna.error_m();
             }
             match followed {
                 Followed::Status(status, _) => {
@@ -252,7 +259,7 @@ impl Job {
     }
 
     /// Ends a stretch: gives its events their positions, and begins another one.
-    fn end(&mut self, receiver: &mut Receiver, reading: &mut Reading, entry: &Entry, wanted: &Wanted) {
+    fn end(&mut self, receiver: &mut Receiver, reading: &mut Reading, entry: &Entry, wanted: &Wanted<'_>) {
         receiver.end();
         self.hear(receiver, reading, entry);
         receiver.wheel_lost();
@@ -331,9 +338,4 @@ fn lines(distance_m: &Range<f64>, find: impl Fn(f64) -> Result<Found, Missing>) 
     // A single position is no line.
     let lines = places.split(Option::is_none).filter(|line| line.len() > 1);
     lines.map(|line| line.iter().flatten().copied().collect()).collect()
-}
-
-/// The last offsets of beam and tool in a log.
-pub fn antenna_of(log: &[Entry]) -> Option<Antenna> {
-    log.iter().rev().find(|entry| entry.kind == Kind::Antenna).and_then(|entry| Antenna::parse(&entry.text))
 }

@@ -2,7 +2,7 @@
 //!
 //! A time that goes back, and a pause that no user waits for, are told and jumped over.
 
-use crate::recorder::NO_POSITION;
+use crate::recorder::useless;
 use crate::sentence::{DAY_MS, Finder, Line};
 use std::collections::VecDeque;
 
@@ -29,12 +29,12 @@ pub fn pieces(file: &[u8]) -> Result<VecDeque<Piece>, &'static str> {
     let mut pieces = VecDeque::new();
     let (mut bytes, mut note) = (Vec::new(), None);
     let (mut due_ms, mut usual_ms, mut last_ms) = (0, 0, None::<i64>);
-    let (mut is_useful, mut has_sentence) = (false, false);
+    let (mut is_useful, mut why) = (false, "no line is NMEA 0183: name a file of a receiver's lines");
     for &byte in file.iter().chain(b"\n") {
         bytes.push(byte);
         let Some(sentence) = finder.take(byte) else { continue };
         let line = Line::parse(&sentence);
-        has_sentence |= line != Line::Damaged;
+        why = useless(why, &line, &sentence);
         if let Line::Report(report) = line {
             is_useful = true;
             if let Some(time_ms) = report.time_ms {
@@ -58,11 +58,7 @@ pub fn pieces(file: &[u8]) -> Result<VecDeque<Piece>, &'static str> {
         }
         pieces.push_back(Piece { due_ms, bytes: std::mem::take(&mut bytes), note: note.take() });
     }
-    match (is_useful, has_sentence) {
-        (true, _) => Ok(pieces),
-        (false, true) => Err(NO_POSITION),
-        (false, false) => Err("no line is NMEA 0183: name a file of a receiver's lines"),
-    }
+    if is_useful { Ok(pieces) } else { Err(why) }
 }
 
 #[cfg(test)]

@@ -96,7 +96,7 @@ struct Rolled {
 #[derive(Clone, Debug, Default)]
 pub struct Receiver {
     /// The fix's standard deviation, if the user knows it.
-    error_m: Option<f64>,
+    pub(crate) error_m: Option<f64>,
     /// The counts so far.
     pub counts: Counts,
     /// The complete fixes that the caller has not taken yet. Several come at once if earlier fixes had jumped and are
@@ -305,6 +305,13 @@ impl Receiver {
             self.jumped.clear();
             return self.accept(here);
         };
+        // The log's clock stands still while some computers sleep. How far the wheel has rolled since is unknown.
+        let slept_ms = (utc_ms - last.fix.utc_ms) as f64 - (time_ms - last.fix.time_ms);
+        if last.fix.session != session || slept_ms > WHEEL_GAP_MS {
+            self.jumped.clear();
+            self.track += 1;
+            return self.accept(Rolled { fix: Fix { track: self.track, ..fix }, rolled_m });
+        }
         self.counts.jumps += 1;
         let far_m = last.fix.place.distance_m(fix.place);
         let rolled_m = (rolled_m - last.rolled_m).abs();

@@ -18,9 +18,19 @@ const SILENCE_MS: u64 = 5_000;
 /// A receiver whose bytes have no RMC or GGA for this long is of no use, in ms.
 const USELESS_MS: u64 = 5_000;
 
-/// Why a receiver or a file of its lines is of no use.
-pub const NO_POSITION: &str = "no line has RMC or GGA of NMEA 0183: turn these sentences on in the receiver";
-const NO_SENTENCE: &str = "no line is NMEA 0183: check --gps-baud and the cable";
+/// Why a receiver's lines are of no use.
+const NO_POSITION: &str = "no line has RMC or GGA of NMEA 0183: turn these sentences on in the receiver";
+const NO_SENTENCE: &str = "no line is NMEA 0183: check --gps-baud and the cable, and turn NMEA on in the receiver";
+const NO_CHECKSUM: &str = "the lines of NMEA 0183 have no checksum: turn it on in the receiver";
+
+/// Why the lines up to this sentence are of no use. `why` is the reason before it.
+pub(crate) fn useless(why: &'static str, line: &Line, sentence: &str) -> &'static str {
+    match line {
+        Line::Damaged if why == NO_POSITION || sentence.contains('*') => why,
+        Line::Damaged => NO_CHECKSUM,
+        _ => NO_POSITION,
+    }
+}
 
 /// Lines of the log: their kind and text.
 pub type Lines = Vec<(Kind, String)>;
@@ -34,8 +44,8 @@ pub struct Recorder {
     heard_ms: Option<u64>,
     /// Since when there was no RMC or GGA. `None` if that was reported.
     useless_since_ms: Option<u64>,
-    /// Whether there was a good sentence since then.
-    has_others: bool,
+    /// Why no line since then is of use.
+    useless: &'static str,
     tick_mm: f64,
     distance: Distance,
 }
@@ -77,7 +87,7 @@ impl Recorder {
     /// The receiver's port is there, of this name.
     pub fn found(&mut self, time_ms: u64, port: &str) -> Lines {
         self.sentences = Finder::default();
-        (self.heard_ms, self.useless_since_ms, self.has_others) = (Some(time_ms), Some(time_ms), false);
+        (self.heard_ms, self.useless_since_ms, self.useless) = (Some(time_ms), Some(time_ms), NO_SENTENCE);
         vec![(Kind::GpsFound, port.to_owned())]
     }
 
@@ -96,14 +106,13 @@ impl Recorder {
         }
         for &byte in bytes {
             let Some(sentence) = self.sentences.take(byte) else { continue };
-            let kind = match Line::parse(&sentence) {
-                Line::Other => {
-                    self.has_others = true;
-                    continue;
-                }
+            let line = Line::parse(&sentence);
+            self.useless = useless(self.useless, &line, &sentence);
+            let kind = match line {
+                Line::Other => continue,
                 Line::Damaged => Kind::GpsDamaged,
                 Line::Report(_) => {
-                    (self.useless_since_ms, self.has_others) = (Some(time_ms), false);
+                    (self.useless_since_ms, self.useless) = (Some(time_ms), NO_SENTENCE);
                     Kind::Gps
                 }
             };
@@ -115,8 +124,7 @@ impl Recorder {
             |since_ms: Option<u64>, limit_ms| since_ms.is_some_and(|ms| time_ms.saturating_sub(ms) > limit_ms);
         if !bytes.is_empty() && is_past(self.useless_since_ms, USELESS_MS) {
             self.useless_since_ms = None;
-            let why = if self.has_others { NO_POSITION } else { NO_SENTENCE };
-            lines.push((Kind::GpsMark, why.to_owned()));
+            lines.push((Kind::GpsMark, self.useless.to_owned()));
         }
         if is_past(self.heard_ms, SILENCE_MS) {
             lines.extend(self.lost("the receiver is silent"));
@@ -164,9 +172,17 @@ mod tests {
 
     #[test]
     fn bytes_without_a_position_are_reported_once_after_5_s() {
-        for (bytes, advice) in [(&b"\x80x\xFF\n"[..], "--gps-baud"), (&b"$GPGSV,1,1,00*79\r\n"[..], "RMC or GGA")] {
+        let without_checksum = GGA.replace("*76", "\r\n");
+        let with_others = format!("$GPGSV,1,1,00*79\r\n{without_checksum}");
+        for (bytes, advice) in [
+            (&b"\x80x\xFF\n"[..], "--gps-baud"),
+            (&b"$GPGSV,1,1,00*79\r\n"[..], "RMC or GGA"),
+            (without_checksum.as_bytes(), "no checksum"),
+            (with_others.as_bytes(), "RMC or GGA"),
+        ] {
             let mut recorder = connected();
-            let lines: Lines = (0..200).flat_map(|tenth| recorder.take(100 * tenth, bytes)).collect();
+            let mut lines: Lines = (0..200).flat_map(|tenth| recorder.take(100 * tenth, bytes)).collect();
+            lines.retain(|(kind, _)| *kind != Kind::GpsDamaged);
             assert_eq!(kinds(&lines), [Kind::GpsMark], "{lines:?}");
             assert!(lines[0].1.contains(advice), "{lines:?}");
         }

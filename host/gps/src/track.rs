@@ -158,7 +158,13 @@ impl Track {
         if from.fix.track != to.fix.track {
             return Err(Missing::Jumped);
         }
-        let is_outage = to.fix.time_ms - from.until_ms > INTERVALS * self.interval_ms;
+        // The wheel stands at the beginning of the pair, and at its end.
+        let session = from.fix.session;
+        let began = from.fix.utc_ms as f64 + (from.until_ms - from.fix.time_ms);
+        let logged_ms = to.fix.time_ms - from.until_ms;
+        let passed_ms = if to.fix.session == session { to.fix.utc_ms as f64 - began } else { logged_ms };
+        // The log's clock stands still while some computers sleep.
+        let is_outage = to.fix.session != session || logged_ms.max(passed_ms) > INTERVALS * self.interval_ms;
         let basis = if is_outage { Basis::Interpolated } else { Basis::Measured };
         if is_outage && (to.distance_m - from.distance_m).abs() > self.longest_outage_m {
             return Err(Missing::OutageTooLong);
@@ -172,11 +178,6 @@ impl Track {
             at += offset.along(forward);
             error_m = error_m.hypot(beside_m * heading_error);
         }
-        // The wheel stands at the beginning of the pair, and at its end.
-        let session = from.fix.session;
-        let began = from.fix.utc_ms as f64 + (from.until_ms - from.fix.time_ms);
-        let passed_ms =
-            if to.fix.session == session { to.fix.utc_ms as f64 - began } else { to.fix.time_ms - from.until_ms };
         let utc_ms = (began + share * passed_ms).round() as i64;
         Ok(Found { place: self.plane.place(at), basis, error_m, utc_ms, session })
     }

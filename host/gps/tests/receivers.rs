@@ -177,6 +177,7 @@ fn a_record_that_is_continued_has_the_date_of_each_session() {
 fn a_file_without_positions_is_refused_with_what_would_be_right() {
     let refused = |file: &[u8]| playback::pieces(file).expect_err("it is of no use");
     assert!(refused(&case("only-gll.nmea")).contains("no line has RMC or GGA"));
+    assert!(refused(b"$GPGGA,092750.000,,,,,0,,,,M,,M,,\r\n").contains("have no checksum"));
     for other in ["", "hello\n", "time_ms,kind,line\n"] {
         assert!(refused(other.as_bytes()).contains("no line is NMEA 0183"), "{other}");
     }

@@ -7,7 +7,7 @@ use gps::plane::{Metres, Place, Plane};
 use gps::sentence::{Quality, framed};
 use gps::simulated::gga;
 use gps::summary::{Stand, Summary};
-use gps::{Job, Wanted, map, picture};
+use gps::{Antenna, Job, Wanted, map, picture};
 use link::Class;
 use logbook::log::{Entry, Kind};
 use proptest::prelude::*;
@@ -193,6 +193,40 @@ fn a_log_that_was_opened_again_and_an_uno_that_was_reset_restart_the_distance() 
 }
 
 #[test]
+fn each_session_has_its_own_antenna_and_the_user_s_offsets_replace_all() {
+    let mut moved = whole();
+    moved[0].text = "beam_ahead_mm=0 beam_right_mm=0 delay_ms=0".to_owned();
+    let log = [whole(), moved].concat();
+    let ahead = |antenna: Antenna| Antenna { beam_ahead_mm: 300.0, ..antenna };
+    let replaced = Wanted { antenna: &ahead, ..Wanted::default() };
+    let plane = Plane::around(FROM);
+    for (wanted, ahead_m) in [(Wanted::default(), [1.0, 0.0]), (replaced, [0.3, 0.3])] {
+        let job = Job::read(&log, &wanted);
+        assert_eq!(job.stretches.len(), 2);
+        for (stretch, ahead_m) in job.stretches.iter().zip(ahead_m) {
+            for plant in stretch.events.iter().filter(is_detection) {
+                let at = plane.metres(plant.found.expect("it has a place").place);
+                assert!((at.east - plant.distance_m - ahead_m).abs() < 1e-3, "{ahead_m}: {plant:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn over_a_gap_of_the_statuses_no_ground_counts_and_no_plant_is_missing() {
+    // The machine rolls on for 25 s. The clock of a computer that sleeps stands still.
+    for clock_ms in [0, 24_900] {
+        let mut log = whole();
+        log.retain(|entry| !(20_001..45_000).contains(&entry.time_ms));
+        log.iter_mut().filter(|entry| entry.time_ms >= 45_000).for_each(|entry| entry.time_ms -= clock_ms);
+        let job = Job::read(&log, &Wanted::default());
+        let summary = Summary::of(&job, &Stand { row_spacing_mm: 500.0, spacing_mm: None });
+        assert_eq!((summary.plants, summary.missing, summary.wheel_gaps, summary.jumps), (15, 0, 1, 0), "{clock_ms}");
+        assert!((summary.worked_m - 7.5).abs() < 1e-6 && (summary.weeded_m - 4.5).abs() < 0.1, "{summary:?}");
+    }
+}
+
+#[test]
 fn a_change_of_the_wheel_begins_a_new_stretch() {
     let mut log = whole();
     let set = vec![
@@ -228,20 +262,41 @@ fn another_wheel_has_no_calibration_yet_and_revert_brings_the_old_one_back() {
     assert_eq!(Job::read(&log, &Wanted::default()).stretches.len(), 3);
 }
 
-#[test]
-fn ground_that_is_rolled_over_again_counts_once() {
-    let status = |time_ms, distance_mm: i64| {
-        let text = format!("state=work tool=in pos={} speed_mm_s=0 windows=0 unseen_mm=0", 2 * distance_mm);
-        Entry { number: 1, time_ms, kind: Kind::Status, text }
-    };
+/// The weeded ground of a machine that rolls to these distances in mm, in a state and with a tool. Its swings have no
+/// lines.
+fn weeded_m(passes: &[(&str, &str, &[i64])]) -> f64 {
     let entry = |kind, text: &str| Entry { number: 1, time_ms: 0, kind, text: text.to_owned() };
     let mut log = vec![entry(Kind::Connected, "0.2.0"), entry(Kind::Setting, "ticks_per_m=2000")];
-    let distances_mm = [0, 500, 1000, 500, 200, 700, 1200];
-    log.extend(distances_mm.into_iter().enumerate().map(|(at, distance_mm)| status(100 * at as u64, distance_mm)));
+    for &(state, tool, distances_mm) in passes {
+        for distance_mm in distances_mm {
+            let pos = 2 * distance_mm;
+            let text = format!("state={state} tool={tool} pos={pos} speed_mm_s=0 windows=0 unseen_mm=0");
+            log.push(Entry { number: 1, time_ms: 200 * log.len() as u64, kind: Kind::Status, text });
+        }
+    }
     let job = Job::read(&log, &Wanted::default());
     let weeded = job.stretches[0].ground.iter().filter(|ground| ground.did == Did::Weeded);
-    let length_m: f64 = weeded.map(|ground| ground.distance_m.end - ground.distance_m.start).sum();
-    assert!((length_m - 1.2).abs() < 1e-9, "{length_m}");
+    weeded.map(|ground| ground.distance_m.end - ground.distance_m.start).sum()
+}
+
+#[test]
+fn ground_that_is_rolled_over_again_counts_once_and_another_row_for_itself() {
+    let row: &[i64] = &[0, 1000, 2000, 3000];
+    for (passes, expected_m) in [
+        (&[("work", "in", &[0, 500, 1000, 500, 200, 700, 1200][..])][..], 1.2),
+        (&[("work", "in", row), ("hold", "out", &[2000, 1500]), ("work", "in", &[1500, 2500, 3500])], 3.5),
+        (&[("work", "in", row), ("hold", "out", &[3000, 2000, 1000, 0]), ("work", "in", row)], 6.0),
+    ] {
+        let found_m = weeded_m(passes);
+        assert!((found_m - expected_m).abs() < 1e-9, "{passes:?}: {found_m}");
+    }
+}
+
+#[test]
+fn without_the_lines_of_swings_the_statuses_show_the_weeded_ground() {
+    let passes: &[(&str, &str, &[i64])] =
+        &[("work", "in", &[0, 500, 1000]), ("work", "out", &[1500, 2000]), ("work", "in", &[2500, 3000, 3500])];
+    assert!((weeded_m(passes) - 2.5).abs() < 1e-9, "{}", weeded_m(passes));
 }
 
 #[test]

@@ -56,6 +56,13 @@ pub struct Row {
     pub board: Board,
 }
 
+impl Row {
+    /// Whether this is its name, in small or capital letters. Some file systems ignore case.
+    fn is_called(&self, name: &str) -> bool {
+        self.name.to_lowercase() == name.to_lowercase()
+    }
+}
+
 /// An Uno that is plugged in.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Plugged {
@@ -202,7 +209,7 @@ pub fn wrong_with(name: &str) -> Option<String> {
             "it becomes a file's name, and Windows keeps {begin} for a device: add a word, as in row-{begin}"
         ));
     }
-    (name == ALL).then(|| format!("`{ALL}` means every row"))
+    name.eq_ignore_ascii_case(ALL).then(|| format!("`{ALL}` means every row"))
 }
 
 /// The rows' names, in the order of their file.
@@ -239,9 +246,9 @@ impl Names {
         &self.rows
     }
 
-    /// The row of this name.
+    /// The row of this name, in small or capital letters.
     pub fn find(&self, name: &str) -> Option<&Row> {
-        self.rows.iter().find(|row| row.name == name)
+        self.rows.iter().find(|row| row.is_called(name))
     }
 
     /// Names a board. Drops its previous name, and the board that had this name. The row keeps its number.
@@ -253,9 +260,7 @@ impl Names {
         if let Some(problem) = wrong_with(name) {
             return Err(refused(problem));
         }
-        // Some file systems ignore case.
-        let twin = self.rows.iter().find(|row| row.name != name && row.name.to_lowercase() == name.to_lowercase());
-        if let Some(twin) = twin {
+        if let Some(twin) = self.find(name).filter(|row| row.name != name) {
             return Err(refused(format!("there is a row {} already", twin.name)));
         }
         let (key, known) = match &board {
@@ -283,11 +288,12 @@ impl Names {
     /// # Errors
     /// If no row has this name.
     pub fn forget(&mut self, name: &str) -> Result<(), NamesError> {
-        if self.document.remove(name).is_none() {
+        let Some(name) = self.find(name).map(|row| row.name.clone()) else {
             let known: Vec<&str> = self.rows.iter().map(|row| row.name.as_str()).collect();
             let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
             return Err(NamesError::NoRow { path: self.path.clone(), name: name.to_owned(), known });
-        }
+        };
+        self.document.remove(&name);
         self.rows.retain(|row| row.name != name);
         Ok(())
     }
@@ -328,6 +334,9 @@ fn parse(path: &Path, text: &str) -> Result<(DocumentMut, Vec<Row>), FileError> 
         };
         if let Some(other) = rows.iter().find(|row| row.board == board) {
             return Err(wrong(format!("{name} has the board of {}: each row has one of its own", other.name)));
+        }
+        if let Some(twin) = rows.iter().find(|row| row.is_called(name)) {
+            return Err(wrong(format!("there is a row {} already", twin.name)));
         }
         rows.push(Row { name: name.to_owned(), board });
     }
@@ -399,7 +408,7 @@ mod tests {
         assert_eq!(rows, [("left", &number("C3")), ("middle", &Board::Port("/dev/pts/7".to_owned()))]);
         names.write().unwrap();
         assert_eq!(Names::read(&path).unwrap().rows(), names.rows());
-        names.forget("middle").unwrap();
+        names.forget("Middle").unwrap();
         let error = names.forget("middle").unwrap_err().to_string();
         assert!(error.ends_with("has no row middle: it has left"), "{error}");
     }
@@ -419,7 +428,7 @@ mod tests {
             ("row.", "neither a blank nor a dot"),
             ("Con", "Windows keeps con for a device"),
             ("com1.left", "Windows keeps com1 for a device: add a word, as in row-com1"),
-            ("all", "`all` means every row"),
+            ("All", "`all` means every row"),
             ("left", "there is a row Left already"),
         ] {
             let error = names.name(name, number("B2")).unwrap_err().to_string();
@@ -436,6 +445,7 @@ mod tests {
             ("left = { port = \"\" }\n", "line 1: left is"),
             ("left = { port = \"a\", serial_number = \"b\" }\n", "line 1: left is"),
             ("a = { port = \"x\" }\nb = { port = \"x\" }\n", "line 2: b has the board of a"),
+            ("a = { port = \"x\" }\nA = { port = \"y\" }\n", "line 2: there is a row a already"),
             ("\"a/b\" = { port = \"x\" }\n", "line 1: \"a/b\" cannot be a row's name"),
             ("left = \n", "line 1: "),
         ] {

@@ -3,8 +3,8 @@
 //! The columns are `time_ms` since the log was opened, `kind` and `line`. `line` is the firmware's own text. The log
 //! also holds the machine's version, settings and examples at each connection, so that it can be replayed alone. It
 //! holds the output of a satellite receiver as lines whose kind begins with `gps`. Each line is written before the next
-//! is read, and saved to the disk within about a second. So a power failure costs at most the last lines, and the next
-//! session removes one that is cut off.
+//! is read, and saved to the disk within about a second. So a power failure costs at most the last lines. A reader
+//! leaves out one that is cut off, and the next session removes it.
 
 use crate::disk::Disk;
 use files::csv_table::is_above_header;
@@ -55,6 +55,12 @@ pub enum Kind {
 
 const HEADER: &str = "time_ms,kind,line";
 
+/// The bytes that may end a line. A spreadsheet may have saved the log with another line end.
+const ENDS: &[u8] = b"\r\n";
+
+/// A longer log is not continued, in bytes. A day adds some 60 MiB, and a log is read up to 256 MiB.
+const LONGEST: u64 = 192 << 20;
+
 /// Why a log cannot be written.
 #[derive(Debug, Error)]
 pub enum LogError {
@@ -64,6 +70,9 @@ pub enum LogError {
     /// The file is no log.
     #[error("{0} exists already and is no log: choose another name")]
     NoLog(PathBuf),
+    /// The file would soon be too long to be read.
+    #[error("{0} is longer than 192 MiB, and is not continued: choose another name")]
+    Long(PathBuf),
     /// The lines of two programs would damage each other.
     #[error("another program writes {0}: end that one, or choose another name")]
     Shared(PathBuf),
@@ -116,21 +125,24 @@ impl LogWriter {
     /// Opens a log. An existing one is continued.
     ///
     /// # Errors
-    /// If the file cannot be written, is something else, or is written by another program.
+    /// If the file cannot be written, is something else, is too long, or is written by another program.
     pub fn open(path: &Path) -> Result<Self, LogError> {
         let failed = |source| FileError::unwritten(path, source);
         let mut file = open_alone(path).map_err(|error| match error.kind() {
             ErrorKind::WouldBlock => LogError::Shared(path.into()),
             _ => failed(error).into(),
         })?;
+        if file.metadata().map_err(failed)?.len() > LONGEST {
+            return Err(LogError::Long(path.into()));
+        }
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes).map_err(failed)?;
-        if !bytes.is_empty() && !bytes.starts_with(HEADER.as_bytes()) {
+        let text = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(&bytes);
+        // A further column would be missing in new lines.
+        if !bytes.is_empty() && text.split(|byte| ENDS.contains(byte)).next() != Some(HEADER.as_bytes()) {
             return Err(LogError::NoLog(path.into()));
         }
         // Removes a last line that a power failure has cut off. It would damage the next line.
-        // A spreadsheet may have saved it with another line end.
-        const ENDS: &[u8] = b"\r\n";
         let whole = end(&bytes, ENDS);
         file.set_len(whole as u64).and_then(|()| file.seek(SeekFrom::End(0))).map_err(failed)?;
         let lines = bytes[..whole].split(|byte| ENDS.contains(byte)).filter(|line| !line.is_empty());
@@ -230,11 +242,12 @@ pub fn read(path: &Path) -> Result<Vec<Entry>, FileError> {
     parse(path, files::bounded_file::recorded(path)?)
 }
 
-/// The lines in a log's text.
+/// The lines in a log's text. A last line without its end is left out: it is cut off, and so may be its values.
 ///
 /// # Errors
 /// As [`read`].
-pub fn parse(path: &Path, text: Vec<u8>) -> Result<Vec<Entry>, FileError> {
+pub fn parse(path: &Path, mut text: Vec<u8>) -> Result<Vec<Entry>, FileError> {
+    text.truncate(end(&text, ENDS));
     let table = CsvTable::parse(path, text, &HEADER.split(',').collect::<Vec<_>>())?;
     table
         .lines()
@@ -289,12 +302,13 @@ impl Pieces {
         self.lines(text, is_wanted)
     }
 
-    /// Parses the last line, if no line feed ends it.
+    /// Parses the last lines, as far as they are whole.
     ///
     /// # Errors
     /// As [`read`].
     pub fn end(mut self, is_wanted: impl FnMut(&str) -> bool) -> Result<Vec<Entry>, FileError> {
-        let last = std::mem::take(&mut self.cut);
+        let mut last = std::mem::take(&mut self.cut);
+        last.truncate(end(&last, ENDS));
         let entries = self.lines(last, is_wanted)?;
         // For an empty log this returns the error for a missing header.
         if self.has_entries { Ok(entries) } else { self.parse() }
@@ -436,11 +450,31 @@ mod tests {
     }
 
     #[test]
-    fn another_file_is_not_written_over() {
+    fn a_last_line_that_a_power_failure_has_cut_is_left_out() {
+        for cut in ["4", "43,s", "43,status,state=ho", "43,gps,\"$GPGGA,09", "43,event,pos=1\0\0\0", "\0\0"] {
+            for end in ["\n", "\r\n", "\r"] {
+                let text = format!("{HEADER}\n0,connected,0.2.0\n").replace('\n', end) + cut;
+                let entries = parse(Path::new("log"), text.clone().into_bytes()).unwrap();
+                assert_eq!(entries.iter().map(|entry| entry.kind).collect::<Vec<_>>(), [Kind::Connected], "{text:?}");
+                let mut pieces = Pieces::new(Path::new("log"));
+                let first = pieces.take(text.as_bytes(), |_| true).unwrap();
+                assert_eq!([first, pieces.end(|_| true).unwrap()].concat(), entries, "{text:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn another_file_is_not_written_over_and_no_log_grows_too_long() {
         let file = tempfile::NamedTempFile::new().unwrap();
-        fs::write(file.path(), "my diary\n").unwrap();
-        assert!(matches!(LogWriter::open(file.path()), Err(LogError::NoLog(_))));
-        assert_eq!(fs::read_to_string(file.path()).unwrap(), "my diary\n");
+        for other in ["my diary\n", "time_ms,kind,line,notes\n0,lost,gone,\n"] {
+            fs::write(file.path(), other).unwrap();
+            assert!(matches!(LogWriter::open(file.path()), Err(LogError::NoLog(_))));
+            assert_eq!(fs::read_to_string(file.path()).unwrap(), other);
+        }
+        fs::write(file.path(), format!("\u{feff}{HEADER}\r\n0,lost,gone\r\n")).unwrap();
+        assert_eq!(LogWriter::open(file.path()).unwrap().lines(), 1);
+        file.as_file().set_len(LONGEST + 1).unwrap();
+        assert!(matches!(LogWriter::open(file.path()), Err(LogError::Long(_))));
     }
 
     #[test]

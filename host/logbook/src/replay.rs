@@ -236,7 +236,7 @@ mod tests {
     /// typed lines, answers and events come after the status of their number.
     fn log(happens: &[(u64, Kind, &str)]) -> Vec<Entry> {
         let mut lines = vec![(0, Kind::Connected, "0.2.0".to_owned())];
-        for status in 0..20 {
+        for status in 0..30 {
             let (time_ms, position) = (100 * status, status as i64 * 95);
             let unseen_mm = 450_u64.saturating_sub(50 * status);
             let line = format!("state=hold tool=out pos={position} speed_mm_s=500 windows=0 unseen_mm={unseen_mm}");

@@ -66,7 +66,8 @@ fn rows_are_named_listed_renamed_and_forgotten() {
     let file = named(&folder, 2);
     let list = printed(&weeder(&["rows", "--rows-file", &file], ""), 0);
     assert!(list.contains("left") && list.contains("middle") && list.contains("row1"), "{list}");
-    printed(&weeder(&["rows", "name", "hedge", port(&folder, 1).to_str().unwrap(), "--rows-file", &file], ""), 0);
+    let said = weeder(&["rows", "name", "hedge", port(&folder, 1).to_str().unwrap(), "--rows-file", &file], "");
+    assert!(printed(&said, 0).contains("middle is forgotten: it was this board\nhedge is "));
     let json = printed(&weeder(&["rows", "--json", "--rows-file", &file], ""), 0);
     let json: serde_json::Value = serde_json::from_str(&json).expect("it is JSON");
     let names: Vec<&str> = json.as_array().unwrap().iter().filter_map(|row| row["name"].as_str()).collect();
@@ -75,7 +76,7 @@ fn rows_are_named_listed_renamed_and_forgotten() {
     let error = printed(&weeder(&["rows", "forget", "left", "--rows-file", &file], ""), 2);
     assert!(error.contains("has no row left: it has hedge"), "{error}");
     let error = printed(&weeder(&["rows", "name", "left", "/dev/no-such-port", "--rows-file", &file], ""), 2);
-    assert!(error.contains("there is no port /dev/no-such-port"), "{error}");
+    assert!(error.contains("there is no port /dev/no-such-port: `weeder rows` lists"), "{error}");
     let error = printed(&weeder(&["settings", "pull", "x", "--all", "--rows-file", "no-such.toml"], ""), 2);
     assert!(error.contains("there is no no-such.toml: `weeder rows name` makes it"), "{error}");
 }
@@ -107,6 +108,10 @@ fn settings_of_several_rows_are_pulled_pushed_and_compared_and_the_row_that_fail
         "{pushed}"
     );
     assert!(pushed.contains("right: Set: wheel_mm\n"), "{pushed}");
+    let one = |port: &str| weeder(&["settings", "push", kept, "--port", port, "--rows-file", &file], "");
+    assert!(printed(&one("right"), 0).starts_with("The machine has these settings already\n"));
+    let error = printed(&one(&format!("hedge={}", port(&folder, 2).display())), 2);
+    assert!(error.contains("kept is a folder: name a file"), "{error}");
     let json = printed(&with(&["settings", "pull", "--json"]), 0);
     let json: serde_json::Value = serde_json::from_str(&json).expect("it is JSON");
     assert_eq!([&json["left"]["wheel_mm"], &json["right"]["wheel_mm"]], [400, 405]);
@@ -179,7 +184,7 @@ fn the_plain_monitor_types_to_one_row_or_all_and_prints_each_answer() {
     let [left, right] = [0, 1].map(|number| port(&folder, number).display().to_string());
     let ports = ["--port", &format!("left={left}"), "--port", &format!("right={right}")].map(str::to_owned);
     let words: Vec<&str> = ["monitor", "--plain"].into_iter().chain(ports.iter().map(String::as_str)).collect();
-    let said = printed(&weeder(&words, "save\nclear\nleft: start\nall: version\nhold\n"), 0);
+    let said = printed(&weeder(&words, "save\nclear\nLeft: start\nALL: version\nhold\n"), 0);
     assert!(said.contains("left: ok\n") && said.contains("right: weeder "), "{said}");
     assert!(said.contains("left: state is=work\n") && !said.contains("right: state is=work"), "{said}");
     assert!(said.contains("HOLD 2 of 2 in ") && said.contains(" last\n"), "{said}");

@@ -14,6 +14,14 @@ use std::ops::Range;
 /// the stretch's beginning or end.
 const STANDING_MS: f64 = 1000.0;
 
+/// A machine rolls at most this far between two statuses, in metres, and in metres for each second. The clocks of some
+/// computers stand still during their sleep.
+const AWAKE_M: f64 = 1.0;
+const AWAKE_M_S: f64 = 5.0;
+
+/// Rolling back farther than this in hold leads to another row, in metres.
+const NEXT_ROW_M: f64 = 2.0;
+
 /// A status of the wheel.
 #[derive(Clone, Copy)]
 pub(super) struct Rolled {
@@ -43,7 +51,9 @@ impl Reading {
 
     /// Whether the wheel has rolled between two statuses, and it is not known when.
     fn is_gap(from: &Rolled, to: &Rolled) -> bool {
-        to.time_ms - from.time_ms > WHEEL_GAP_MS && (to.m - from.m).abs() > STANDING_M
+        let (time_ms, rolled_m) = (to.time_ms - from.time_ms, (to.m - from.m).abs());
+        let has_slept = rolled_m > AWAKE_M + AWAKE_M_S * time_ms / 1000.0;
+        has_slept || (time_ms > WHEEL_GAP_MS && rolled_m > STANDING_M)
     }
 
     /// The marks of all gaps.
@@ -75,37 +85,52 @@ impl Reading {
     }
 
     pub(super) fn status(&mut self, status: Status, at_m: f64, entry: &Entry) {
-        self.wheel.push(Rolled { time_ms: entry.time_ms as f64, m: at_m, line: entry.number });
-        let did = match (status.mode, status.tool_out) {
-            (Mode::Work, false) => Did::Weeded,
-            (Mode::Work, true) => Did::Spared,
-            (Mode::Hold | Mode::Alarm, _) => Did::Rolled,
-        };
-        match self.ground.last_mut() {
+        let here = Rolled { time_ms: entry.time_ms as f64, m: at_m, line: entry.number };
+        self.leave_gap(&here);
+        let did = shown(&status);
+        let shows_the_same = self.last_status.as_ref().is_some_and(|last| shown(last) == did);
+        let last = self.wheel.last().copied().filter(|_| shows_the_same);
+        self.wheel.push(here);
+        match self.ground.last().map(|passed| (passed.did, passed.distance_m.start)) {
             None => self.ground.push(Ground::begin(did, at_m, entry.time_ms)),
-            Some(passed) => {
-                passed.distance_m.end = passed.distance_m.end.max(at_m);
-                passed.time_ms.end = entry.time_ms;
-                // A swing has its own position.
-                let is_at_work = |did: Did| did != Did::Rolled;
-                if is_at_work(passed.did) != is_at_work(did) {
-                    self.turn_to(did, at_m, entry.time_ms);
+            Some((passed, _)) if (passed == Did::Rolled) != (did == Did::Rolled) => {
+                self.turn_to(did, at_m, entry.time_ms);
+            }
+            Some((_, start_m)) => {
+                // A swing has its own position. If its line is missing, two statuses show it.
+                if let Some(last) = last.filter(|last| last.m > start_m) {
+                    self.turn_to(did, last.m, last.time_ms as u64);
                 }
             }
+        }
+        if let Some(passed) = self.ground.last_mut() {
+            passed.distance_m.end = passed.distance_m.end.max(at_m);
+            passed.time_ms.end = entry.time_ms;
         }
         self.last_status = Some(status);
     }
 
+    /// Ends the ground before a gap that ends here.
+    fn leave_gap(&mut self, to: &Rolled) {
+        if let Some(from) = self.wheel.last().copied().filter(|from| Self::is_gap(from, to)) {
+            self.turn_to(Did::Rolled, from.m, from.time_ms as u64);
+        }
+    }
+
     /// From this distance on the ground gets another kind of work.
-    fn turn_to(&mut self, did: Did, at_m: f64, time_ms: u64) {
+    fn turn_to(&mut self, did: Did, mut at_m: f64, time_ms: u64) {
         let Some(passed) = self.ground.last_mut() else { return };
         if passed.did == did {
             return;
         }
-        // A swing is reported somewhat later than it is commanded, and perhaps after a status with a farther position.
-        let at_m = at_m.max(passed.distance_m.start);
-        passed.distance_m.end = at_m;
-        passed.time_ms.end = time_ms;
+        let is_next_row = passed.did == Did::Rolled && at_m < passed.distance_m.end - NEXT_ROW_M;
+        if !is_next_row {
+            // A swing is reported somewhat later than it is commanded, and perhaps after a status with a farther
+            // position.
+            at_m = at_m.max(passed.distance_m.start);
+            passed.distance_m.end = at_m;
+        }
+        passed.time_ms.end = time_ms.max(passed.time_ms.start);
         self.ground.push(Ground::begin(did, at_m, time_ms));
     }
 
@@ -130,6 +155,7 @@ impl Reading {
                 let is_at_work = self.last_status.as_ref().is_some_and(|status| status.mode == Mode::Work)
                     || self.ground.last().is_some_and(|passed| passed.did != Did::Rolled);
                 if let Some(at_m) = metres(position).filter(|_| is_at_work) {
+                    self.leave_gap(&Rolled { time_ms: entry.time_ms as f64, m: at_m, line: entry.number });
                     self.turn_to(if out { Did::Spared } else { Did::Weeded }, at_m, entry.time_ms);
                 }
                 (if out { EventKind::SwingOut } else { EventKind::SwingIn }, position, 0.0)
@@ -165,6 +191,15 @@ impl Reading {
         let Some(detection) = self.events.iter().rev().find(is_detection).cloned() else { return };
         let (line, time_ms, text) = (command.number, command.time_ms, command.text.clone());
         self.events.push(Event { kind: EventKind::Label(class), line, text, time_ms, ..detection });
+    }
+}
+
+/// The work that a status shows.
+fn shown(status: &Status) -> Did {
+    match (status.mode, status.tool_out) {
+        (Mode::Work, false) => Did::Weeded,
+        (Mode::Work, true) => Did::Spared,
+        (Mode::Hold | Mode::Alarm, _) => Did::Rolled,
     }
 }
 

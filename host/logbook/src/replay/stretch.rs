@@ -168,11 +168,20 @@ impl<'a> Stretch<'a> {
             Happened::Event(EventLine::State { mode }) => mode,
             _ => return None,
         };
+        let before = || self.happened[..place].iter().rev().find_map(swing_or_status).map(|(position, _)| position);
         let next_status = || {
             let mut until_next = self.happened[place + 1..].iter().take_while(|happened| !is_change(happened));
-            until_next.find_map(|happened| Some(status(happened)?.position))
+            let next = until_next.find_map(status)?;
+            if mode != Mode::Work || next.unseen_mm <= 0 {
+                return Some(next.position);
+            }
+            // Work began on unseen ground, from the tool to the beam and a margin ahead. The machine has left some of it since.
+            let [to_beam_mm, margin_mm] =
+                [Setting::BeamToToolMm, Setting::MarginMm].map(|setting| i32::from(self.settings.get(setting)));
+            let left_mm = u16::try_from(to_beam_mm + margin_mm - next.unseen_mm).unwrap_or(0);
+            let most = next.position.wrapping_sub(before()?).max(0);
+            Some(next.position.wrapping_sub(self.settings.wheel().ticks(left_mm).0.min(most)))
         };
-        let before = || self.happened[..place].iter().rev().find_map(swing_or_status).map(|(position, _)| position);
         // At most one status comes between the change and its swing.
         let is_cut = || self.happened[place..].iter().filter_map(status).nth(1).is_none() && !self.was_out(place);
         match self.swing_of_change(place) {

@@ -245,7 +245,7 @@ fn a_receiver_that_is_unplugged_for_long_costs_places_and_no_line_of_the_machine
     let setup = ReceiverSetup { rate_hz: 2.0, ..ReceiverSetup::default() };
     let antenna = Antenna { beam_ahead_mm: 500.0, ..Antenna::default() };
     let log = recorded(&row, &motion, &setup, &antenna, 10.0..20.0);
-    let read = |longest_outage_m| Job::read(&log, &Wanted { antenna: None, longest_outage_m });
+    let read = |longest_outage_m| Job::read(&log, &Wanted { longest_outage_m, ..Wanted::default() });
     let far = read(8.0);
     assert!(errors_m(&far, &row, &setup).iter().any(|(_, basis)| *basis == Basis::Interpolated));
     assert_eq!((far.unplugged, far.counts.losses), (1, 1));
