@@ -53,6 +53,9 @@ export function wakeOnTouch(use: () => void): void {
 }
 
 async function wake(): Promise<void> {
+    // Otherwise the ring switch of an iPhone turns the sound off.
+    const { audioSession } = navigator as Navigator & { audioSession?: { type: string } };
+    if (audioSession) audioSession.type = isOn() ? "playback" : "auto";
     context ??= new AudioContext();
     // A call or a locked screen stops it.
     context.onstatechange = changed;

@@ -75,6 +75,7 @@ test("an alarm, a lost machine and an obeyed HOLD are each heard and felt as ano
     const opened = await tryIt(browser);
     const { page } = opened;
     await page.evaluate(() => {
+        Object.assign(navigator, { audioSession: {} });
         globalThis.signals = [];
         const { start } = OscillatorNode.prototype;
         OscillatorNode.prototype.start = function (at) {
@@ -100,6 +101,8 @@ test("an alarm, a lost machine and an obeyed HOLD are each heard and felt as ano
     await sound.click();
     await page.waitForFunction(() => !document.querySelector("#sound.waiting"));
     assert.equal(await heard(page), held, "turned on, it is heard at once");
+    // Also on an iPhone whose ring switch is off.
+    assert.equal(await page.evaluate(() => Reflect.get(navigator, "audioSession").type), "playback");
     await part(page, "start").click();
     await part(page, "state").filter({ hasText: "work" }).waitFor();
     // The answer to HOLD and the following state, with the delay of a slow line.

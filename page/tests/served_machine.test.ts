@@ -5,6 +5,7 @@ import test, { beforeEach } from "node:test";
 import { Served, ServedMachine } from "../src/link/served.ts";
 import { type Happening, NoMachine, NotSent, Refused } from "../src/link/session.ts";
 import { Machine } from "../src/panel/machine.ts";
+import { english } from "../src/words/words.ts";
 
 /** A command on its way. */
 interface Sent {
@@ -147,7 +148,7 @@ test("a machine that is lost answers no command, and says why", async () => {
     await Promise.all([
         assert.rejects(
             dump,
-            (error) => error instanceof NoMachine && /the port is gone\. This may have been done/.test(error.message),
+            (error) => error instanceof NoMachine && /the port is gone\. The machine may have done this/.test(error.message),
         ),
         assert.rejects(start, new NoMachine("the machine is not there")),
     ]);
@@ -203,16 +204,16 @@ test("a machine that is lost at work weeds on, also when its absence is told aga
     assert(!shown.why.includes("weeds on"), shown.why);
 });
 
-test("a page whose operator stays after a new start of weeder serve is loaded again later", async (test) => {
+test("after a new start of weeder serve the page loads itself again, unless that would drop a log", async (test) => {
     let [status, reloads] = [200, 0];
-    const timers: { due: () => void; ms: number }[] = [];
-    const told: { error?: () => void } = {};
+    const told: { error?: () => void; due?: () => void } = {};
     const { setTimeout } = globalThis;
     test.after(() => Object.assign(globalThis, { setTimeout }));
-    globalThis.fetch = async () => new Response('{"machines":[]}', { status });
+    globalThis.fetch = async () => new Response('{"machines":["row"]}', { status });
     Object.assign(globalThis, {
-        setTimeout: (due: () => void, ms: number) => timers.push({ due, ms }),
-        // The operator stays: the call returns.
+        setTimeout: (then: () => void) => {
+            told.due = then;
+        },
         location: { reload: () => reloads++ },
         EventSource: class {
             addEventListener(name: "error", listener: () => void) {
@@ -221,19 +222,23 @@ test("a page whose operator stays after a new start of weeder serve is loaded ag
             close() {}
         },
     });
-    const served = await Served.open();
-    served.listen();
-    status = 401;
-    told.error?.();
-    for (const [ms, expected] of [
-        [2000, 1],
-        [30_000, 2],
-        [30_000, 3],
-    ]) {
-        const timer = timers.at(-1);
-        assert.equal(timer?.ms, ms);
-        timer?.due();
+    for (const [mayReload, expected] of [
+        [false, { reloads: 0, why: english("servedOther") }],
+        [true, { reloads: 1, why: english("servedSilent") }],
+    ] as const) {
+        status = 200;
+        const served = await Served.open();
+        served.mayReload = () => mayReload;
+        let why = "";
+        for (const machine of served.machines)
+            machine.onAbsent = (absent) => {
+                why = absent;
+            };
+        served.listen();
+        status = 401;
+        told.error?.();
+        told.due?.();
         for (let turn = 0; turn < 5; turn++) await goOn();
-        assert.equal(reloads, expected);
+        assert.deepEqual({ reloads, why }, expected);
     }
 });

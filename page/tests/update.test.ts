@@ -80,6 +80,10 @@ test("from localhost the page can be installed, opens without a network, and say
     await inspect(page, "desk-newer");
     assert.equal(await page.locator("h1").textContent(), "weeder");
     const other = await page.context().newPage();
+    // The server may have another page beside it.
+    writeFileSync(join(folder, "other.html"), "<h1>other");
+    await other.goto(address.replace("#work", "other.html"));
+    assert.equal(await other.locator("h1").textContent(), "other");
     await other.goto(address);
     await page.getByRole("button", { name: "Load it" }).click();
     await page.locator("h1", { hasText: "weeder 2" }).waitFor();

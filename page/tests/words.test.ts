@@ -123,6 +123,7 @@ test("what weeder serve and the project's Rust say in English is known by the ta
         ["../host/serve/src/machine.rs", en.heard.servedNoAnswer],
         ["../host/serve/src/machine.rs", en.heard.tooMuchWaits],
         ["../host/serve/src/machine.rs", en.heard.servedNotThere],
+        ["../host/serve/src/routes.rs", en.heard.mayBeDone],
     ] as const)
         assert(readFileSync(path, "utf8").includes(text), `${path} does not say: ${text}`);
 
@@ -341,5 +342,17 @@ test("another language leaves the machine connected, and what was said before is
     assert((await page.evaluate(() => globalThis.simulation.uno.cycle)) > connected);
     assert.equal(await part(page, "said").getByText("connected to weeder").count(), 1);
     assert.equal(await part(page, "said").getAttribute("lang"), "en");
+    // A screen reader says an error in its language, and an answer in English.
+    await part(page, "tab-console").click();
+    for (const [line, text, lang] of [
+        ["wed", LANGUAGES.fr.heard.refusedCommand, "fr"],
+        ["hold", "ok", "en"],
+    ] as const) {
+        await part(page, "typed").fill(line);
+        await part(page, "typed").press("Enter");
+        await pass(page, 0.5);
+        await part(page, "answered").filter({ hasText: text }).waitFor({ state: "attached" });
+        assert.equal(await part(page, "answered").getAttribute("lang"), lang);
+    }
     await close(opened);
 });

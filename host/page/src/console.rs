@@ -100,11 +100,12 @@ pub struct Heard {
 impl Heard {
     /// The steps, and the results of all lines so far, in the form of `page/src/panel/set_up.ts`.
     pub fn advice(&self) -> Value {
+        let (settings, _) = settings(Settings::new(), &self.settings);
         let set_up = SET_UP.with_borrow_mut(|set_up| {
+            set_up.settings.clone_from(&settings);
             self.lines.iter().for_each(|line| set_up.take_line(line));
             set_up.clone()
         });
-        let (settings, _) = settings(Settings::new(), &self.settings);
         let manual = set_up::steps().into_iter().map(|step| {
             let tasks: Vec<String> = step.tasks.iter().map(task).collect();
             let (is_shown, open) = (step.is_shown(), set_up.open(&step.tasks, &settings));

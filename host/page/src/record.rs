@@ -41,7 +41,9 @@ struct Picture {
     /// Whether nothing is drawn, because settings are unknown; and the times at which that began.
     is_stopped: bool,
     unknown_ms: Vec<u64>,
+    /// The time of all sessions of the log so far, and of those before the present one.
     time_ms: u64,
+    before_ms: u64,
     swings: usize,
     /// The tool's positions, each with whether it is out from there on.
     changes: Vec<(f64, bool)>,
@@ -59,7 +61,11 @@ const WORKED: usize = 2;
 
 impl Picture {
     fn take(&mut self, entry: &Entry) {
-        self.time_ms = entry.time_ms;
+        // In a continued log the time restarts at 0.
+        if self.before_ms.saturating_add(entry.time_ms) < self.time_ms {
+            self.before_ms = self.time_ms;
+        }
+        self.time_ms = self.before_ms.saturating_add(entry.time_ms);
         self.has_places |= entry.kind == Kind::Gps;
         let followed = self.follower.take(entry);
         let is_known = self.follower.knows_wheel() && self.follower.in_use().knows(&[Setting::BeamToToolMm]);
@@ -67,7 +73,7 @@ impl Picture {
             Followed::Linked => self.end_stretch(),
             Followed::Status(..) | Followed::Event(_) if !is_known => {
                 if !std::mem::replace(&mut self.is_stopped, true) {
-                    self.unknown_ms.push(entry.time_ms);
+                    self.unknown_ms.push(self.time_ms);
                     self.end_stretch();
                 }
             }
@@ -85,9 +91,9 @@ impl Picture {
                 if self.shown.replace((here_mm, status.mode)).is_none() {
                     self.changes.push((here_mm, status.tool_out));
                 }
-                self.tables[SPEEDS].extend([here_mm, entry.time_ms as f64, f64::from(status.speed_mm_s)]);
+                self.tables[SPEEDS].extend([here_mm, self.time_ms as f64, f64::from(status.speed_mm_s)]);
             }
-            Followed::Event(event) => self.take_event(&event, &entry.text, entry.time_ms),
+            Followed::Event(event) => self.take_event(&event, &entry.text, self.time_ms),
             _ => {}
         }
     }
@@ -402,7 +408,7 @@ mod tests {
             shown(&changed(&format!("{reverted}1400,command,get\n{SETTINGS}1400,answer,ok\n1500,{plant}")), 64);
         // It goes on behind a metre.
         assert_eq!(rows::<5>(&picture, OBJECTS)[0][1], 2000.0);
-        assert_eq!(rows::<3>(&picture, SPEEDS)[2], [2300.0, 3000.0, 500.0]);
+        assert_eq!(rows::<3>(&picture, SPEEDS)[2], [2300.0, 4400.0, 500.0]);
     }
 
     #[test]
@@ -425,8 +431,11 @@ mod tests {
     fn statuses_close_together_are_left_out_and_lines_keep_their_numbers() {
         let statuses: String = (0..10).map(|number| status(100 * number, "in", 1000 * number)).collect();
         let log = format!("{BEGIN}{statuses}0,connected,0.2.0\n{}", status(50, "in", 0));
-        let times: Vec<f64> = rows::<3>(&shown(&log, 100), SPEEDS).iter().map(|speed| speed[1]).collect();
-        assert_eq!(times, [0.0, 300.0, 600.0, 900.0, 50.0]);
+        let picture = shown(&log, 100);
+        let times: Vec<f64> = rows::<3>(&picture, SPEEDS).iter().map(|speed| speed[1]).collect();
+        // The second session goes on behind the first.
+        assert_eq!(times, [0.0, 300.0, 600.0, 900.0, 950.0]);
+        assert_eq!(picture["timeMs"], 950);
         let wrong = shown(&format!("{log}1,gossip,hello\n"), 100);
         assert!(wrong["problem"].as_str().is_some_and(|problem| problem.contains("line 15")), "{wrong}");
     }

@@ -17,6 +17,9 @@ const FORM: [&str; 4] = ["/", "/pair", "/pair.css", "/pair.js"];
 #[derive(Clone, Debug)]
 pub struct Door {
     pub reach: Reach,
+    /// The name of a paired phone's cookie. The ports of an address share cookies, so it has the port. Empty at the door
+    /// for this computer, which pairs no phone.
+    pub cookie: String,
     /// The valid values of a request's `Host`.
     names: Vec<String>,
 }
@@ -46,12 +49,13 @@ impl Door {
     /// The door for this computer alone.
     pub fn here(port: u16) -> Self {
         let localhost = ["127.0.0.1", "localhost"].map(|name| named(name, port)).concat();
-        Self { reach: Reach::Here, names: localhost }
+        Self { reach: Reach::Here, cookie: String::new(), names: localhost }
     }
 
     /// The door for the network.
     pub fn lan(address: Ipv4Addr, port: u16, may_start: bool) -> Self {
-        Self { reach: Reach::Lan { may_start }, names: named(&address.to_string(), port) }
+        let (cookie, names) = (format!("weeder-{port}"), named(&address.to_string(), port));
+        Self { reach: Reach::Lan { may_start }, cookie, names }
     }
 
     /// Lets a request in. `is_paired` says whether its cookie belongs to a paired browser.

@@ -64,9 +64,6 @@ const POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; 
 /// The header of a command with the `id` of the last message that its sender has seen.
 const SEEN: &str = "weeder-seen";
 
-/// All ports of an address share cookies.
-const COOKIE_NAME: &str = "weeder";
-
 /// The state that all requests share.
 pub struct Served {
     pub page: Page,
@@ -128,7 +125,7 @@ async fn admit(
 ) -> Response {
     // A client that sends many requests ahead must not block other clients.
     yield_now().await;
-    let phone = cookies(request.headers()).find_map(|token| served.pairing.lock().phone(token));
+    let phone = cookies(request.headers(), &visitor.door.cookie).find_map(|token| served.pairing.lock().phone(token));
     let mut response = match visitor.door.admit(&request, phone.is_some()) {
         Ok(()) => match whole(request).await {
             Ok(mut request) => {
@@ -157,11 +154,11 @@ async fn admit(
     response
 }
 
-/// The values of this program's cookie.
-fn cookies(headers: &HeaderMap) -> impl Iterator<Item = &str> {
+/// The values of the cookie with this name.
+fn cookies<'request>(headers: &'request HeaderMap, name: &str) -> impl Iterator<Item = &'request str> {
     let lines = headers.get_all(COOKIE).iter().filter_map(|value| value.to_str().ok());
     let pairs = lines.flat_map(|line| line.split(';')).filter_map(|pair| pair.trim().split_once('='));
-    pairs.filter(|&(name, _)| name == COOKIE_NAME).map(|(_, value)| value)
+    pairs.filter(move |&(other, _)| other == name).map(|(_, value)| value)
 }
 
 /// The page, or the form for the code.
@@ -194,7 +191,7 @@ async fn pair(
             };
             let paired = served.pairing.lock().pair(token);
             (served.tell)(&format!("{address} is paired now. Paired in all: {paired}."));
-            let cookie = format!("{COOKIE_NAME}={}; HttpOnly; SameSite=Strict; Path=/", hex::encode(token));
+            let cookie = format!("{}={}; HttpOnly; SameSite=Strict; Path=/", door.cookie, hex::encode(token));
             (StatusCode::NO_CONTENT, [(SET_COOKIE, cookie)]).into_response()
         }
         Try::Wrong { left: 0 } => {
@@ -366,7 +363,18 @@ fn heard(hub: &Arc<Hub>) -> impl Stream<Item = Message> + use<> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::net::Ipv4Addr;
     use std::pin::pin;
+
+    #[test]
+    fn two_servers_of_a_computer_do_not_take_each_others_cookies() {
+        let mut headers = HeaderMap::new();
+        headers.insert(COOKIE, HeaderValue::from_static("weeder-8866=one; weeder-8867=other"));
+        for (port, token) in [(8866, "one"), (8867, "other")] {
+            let door = Door::lan(Ipv4Addr::LOCALHOST, port, false);
+            assert_eq!(cookies(&headers, &door.cookie).collect::<Vec<_>>(), [token]);
+        }
+    }
 
     #[tokio::test]
     async fn a_page_that_is_too_far_behind_gets_a_last_message_and_may_connect_again() {

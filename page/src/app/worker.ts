@@ -15,6 +15,8 @@ const NAME = PREFIX + BUILD;
 const DEAD = "dead";
 /** Time for a start: a slow phone takes three seconds. */
 const START_MS = 10_000;
+/** The addresses of the page itself. A server may have other pages beside it. */
+const PAGE = ["./", "index.html"].map((name) => new URL(name, location.href).pathname);
 const worker = globalThis as unknown as ServiceWorkerGlobalScope;
 const starts = new Set<() => void>();
 
@@ -65,7 +67,7 @@ async function tryAgain(client: unknown): Promise<void> {
 /** A file of the page, and whether it is a newer page that was not seen to start. */
 async function choose(request: Request): Promise<{ file: Response; isNew: boolean }> {
     const own = await caches.open(NAME);
-    const isPage = request.mode === "navigate";
+    const isPage = request.mode === "navigate" && PAGE.includes(new URL(request.url).pathname);
     const [older] = isPage ? await others() : [];
     if (older !== undefined && (await own.match(DEAD))) {
         const file = await (await caches.open(older)).match("./");

@@ -19,7 +19,8 @@ const AFTER_RESET_MS = 50;
 export function whyNoSerial(): string | undefined {
     if (isServed()) return english("noSerialServed");
     if (globalThis.isSecureContext === false) return english("noSerialHttp");
-    if (!("serial" in navigator)) return english("noSerial");
+    // On Android it lists Bluetooth devices only.
+    if (!("serial" in navigator) || /Android/.test(navigator.userAgent)) return english("noSerial");
     return undefined;
 }
 
@@ -50,7 +51,7 @@ async function whyNotOpened(error: unknown): Promise<PortError> {
     if (name === "InvalidStateError") return new PortError(english("portOpen"));
     if (name !== "NetworkError") return new PortError(english("portRefused", { text: message }));
     if (await isInOtherTab()) return new PortError(english("portInTab"));
-    const isLinux = /Linux/.test(navigator.userAgent) && !/Android/.test(navigator.userAgent);
+    const isLinux = /Linux/.test(navigator.userAgent);
     return new PortError(english("portTaken", { or: english(isLinux ? "noPermission" : "driverHangs") }));
 }
 

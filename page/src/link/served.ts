@@ -15,8 +15,6 @@ import { type Happening, type Link, type News, NoMachine, NotSent, Refused, tell
 const SILENCE_MS = 3000;
 /** Time between two tries to reach it. */
 const RETRY_MS = 2000;
-/** Time between two tries to load the page again. The browser asks each time while the log is not saved. */
-const RELOAD_MS = 30_000;
 /** Time limit of a HOLD, and of a question about the computer. The page then tries again. */
 const SHORT_MS = 1500;
 /** Time limit of a command, and of a HOLD to all: the computer gives a silent machine up after 3 s. */
@@ -69,6 +67,8 @@ async function send(path: string, limitMs: number, request: RequestInit = {}, go
 
 export class Served {
     readonly machines: readonly ServedMachine[];
+    /** Whether the page may load itself again: no log is lost by that. */
+    mayReload = () => true;
     #events: EventSource | undefined;
     #heardMs = 0;
     /** The number of the last message. */
@@ -122,18 +122,23 @@ export class Served {
         if (!this.#events) return;
         this.#events.close();
         this.#events = undefined;
-        for (const machine of this.machines) machine.tell({ is: "lost", why });
+        this.#tellLost(why);
         setTimeout(() => void this.#again(), RETRY_MS);
+    }
+
+    #tellLost(why: string): void {
+        for (const machine of this.machines) machine.tell({ is: "lost", why });
     }
 
     async #again(): Promise<void> {
         const answer = await send("/machines", SHORT_MS).catch(() => undefined);
         // A new start of `weeder serve` has another code, so it answers with the form. It may have other machines.
         const isOther = answer?.status === 401 || (answer?.isOk && answer.text !== this.text);
-        if (isOther) location.reload();
-        else if (answer?.isOk) return this.listen();
-        // An operator who stays has time to save the log.
-        setTimeout(() => void this.#again(), isOther ? RELOAD_MS : RETRY_MS);
+        // Some browsers would not ask before they drop a log.
+        if (isOther && !this.mayReload()) this.#tellLost(english("servedOther"));
+        else if (isOther) location.reload();
+        else if (answer?.isOk) this.listen();
+        else setTimeout(() => void this.#again(), RETRY_MS);
     }
 }
 

@@ -10,6 +10,8 @@ import type { Machine } from "./machine.ts";
 export class Calibration {
     /** The position at the stretch's beginning. */
     #from: number | undefined;
+    /** The last `servo_out_us` that was put into the field for the pulse. */
+    #out = "";
 
     constructor(
         private readonly parts: Parts,
@@ -44,9 +46,12 @@ export class Calibration {
         parts.button("servo-save", () => void this.#do("servo-said", "save", () => say("isSavedNow")));
     }
 
-    /** Forgets where the stretch began: after a reset, positions begin at 0 again. */
+    /** Begins again, after a reset: positions begin at 0, the tool is out, and what was not saved is gone. */
     forget(): void {
         this.#from = undefined;
+        this.#out = "";
+        for (const said of ["wheel-said", "servo-said"]) this.parts.write(said, "");
+        this.parts.html("wheel-force").hidden = true;
     }
 
     /** Shows the values that change while the machine rolls. */
@@ -61,7 +66,8 @@ export class Calibration {
     }
 
     showSettings(): void {
-        this.parts.get("servo-pulse", HTMLInputElement).value ||= String(this.machine.setting("servo_out_us"));
+        const out = String(this.machine.setting("servo_out_us"));
+        if (out !== this.#out) this.parts.get("servo-pulse", HTMLInputElement).value = this.#out = out;
         for (const name of ["lead_out_ms", "lead_in_ms"]) {
             const input = this.parts.get(name, HTMLInputElement);
             if (document.activeElement !== input) input.value = String(this.machine.setting(name));

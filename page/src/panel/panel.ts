@@ -10,7 +10,7 @@ import type { Allowed } from "../link/served.ts";
 import { type Ask, type Happening, isHold, type Link, NoMachine, NotSent } from "../link/session.ts";
 import { isStill, STILL_MS } from "../preferences.ts";
 import { signal } from "../signals.ts";
-import { english, number, onLanguage, quantity, say, told, translate } from "../words/words.ts";
+import { english, language, number, onLanguage, quantity, say, told, translate } from "../words/words.ts";
 import { Calibration } from "./calibration.ts";
 import { Console } from "./console.ts";
 import { Examples } from "./examples.ts";
@@ -137,26 +137,26 @@ export class Panel {
     /** Sends a HOLD. If it does not come through, it is sent again later, and this fails with the reason. */
     async #sendHold(pending: { againMs: number | undefined; why?: string }): Promise<void> {
         pending.againMs = undefined;
-        const said = this.#parts.html("drive-said");
         try {
             await this.#link?.hold();
             signal("held");
-            if (this.#holdPending === pending) {
-                this.#holdPending = undefined;
-                said.classList.remove("problem");
-                this.#parts.write("drive-said", "");
-            }
+            if (this.#holdPending === pending) this.#dropHold();
         } catch (error) {
             pending.againMs = this.#now + HOLD_AGAIN_MS;
             const { message } = error as Error;
             // The same reason again would hide what was told since.
             if (this.#holdPending === pending && pending.why !== message) {
                 pending.why = message;
-                said.classList.add("problem");
                 this.#parts.say("drive-said", () => say("holdFailed", { why: told(error).replace(/\.$/, "") }));
             }
             throw error;
         }
+    }
+
+    /** Sends HOLD no more, and no longer says so. */
+    #dropHold(): void {
+        this.#holdPending = undefined;
+        this.#parts.write("drive-said", "");
     }
 
     connect(link: Link, nowMs: number): void {
@@ -169,15 +169,17 @@ export class Panel {
         this.#link = link;
     }
 
-    /** Forgets what was measured at another machine. */
+    /** Forgets what was measured at another machine, typed for it and said about it. */
     forget(): void {
         this.#setUp.forget();
+        this.#settings.forget();
+        this.#parts.write("teach-said", "");
     }
 
     async disconnect(): Promise<void> {
         await this.#link?.close?.();
         this.#link = undefined;
-        this.#holdPending = undefined;
+        this.#dropHold();
     }
 
     ask(command: string): Promise<string[]> {
@@ -287,13 +289,17 @@ export class Panel {
 
     /** Types a line of the console. A screen reader says its answer, but not the machine's other output. */
     async #type(line: string): Promise<void> {
+        const answered = this.#parts.html("answered");
+        answered.lang = "en";
         this.#parts.write("answered", "");
         try {
             const answer = await this.ask(line);
             this.#parts.write("answered", answer.join("\n") || "ok");
         } catch (error) {
             const { message } = error as Error;
-            this.#parts.write("answered", told(message));
+            const text = told(message);
+            if (text !== message) answered.lang = language();
+            this.#parts.write("answered", text);
             // The console has no line of what was not sent.
             if (error instanceof NotSent) this.#console.add(`${line}: ${message}`, "error");
             if (error instanceof NoMachine) this.#console.add(message, "error");

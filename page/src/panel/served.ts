@@ -45,6 +45,7 @@ export async function showServed(into: HTMLElement): Promise<Panel[]> {
         return panel;
     });
     panels.push(...shown);
+    served.mayReload = () => !panels.some(({ isNeeded }) => isNeeded);
     setInterval(() => {
         served.watch();
         for (const panel of panels) panel.turn(performance.now());

@@ -23,15 +23,18 @@ export class SettingsForm {
     ) {
         this.#list = parts.html("settings-list");
         parts.button("settings-send", () => void this.#send());
-        parts.button("settings-undo", () => {
-            parts.write("settings-said", "");
-            this.#undo();
-        });
+        parts.button("settings-undo", () => this.forget());
         parts.button("settings-read", () => void this.#take("get", "areMachines"));
         parts.button("settings-defaults", () => void this.#take("defaults", "defaultsInUse"));
         parts.button("settings-revert", () => void this.#take("revert", "savedInUse"));
         parts.button("settings-save-file", () => save(machine.settings, machine.help));
         parts.files("settings-open-file", "settings-file", ([file]) => file && void this.#open(file));
+    }
+
+    /** Drops the operator's changes. */
+    forget(): void {
+        this.parts.write("settings-said", "");
+        this.#undo();
     }
 
     /** Shows the present values. The operator's changes stay. */

@@ -72,7 +72,7 @@ export const words = {
     groundMargins: "{share} margins",
     groundWeeds: "{share} tall weeds and unknowns kept",
     groundSwings: "{share} swings",
-    groundClosed: "{share} unseen ground, holds, alarms",
+    groundClosed: "{share} unseen, too fast, holds, alarms",
     left: "Left: {parts}.",
     leftSwings: "{count} where the tool swung",
     leftPlants: "{count} beside a plant",
@@ -152,7 +152,7 @@ export const words = {
     isClass: "It is a {class}",
     taughtThat: "Taught: {what}.",
     watchOnly:
-        "From here the machine is watched and held. It is started, and its alarms are cleared, at the machine itself, or from here where weeder serve was started with --allow-start. Settings, calibration and teaching are for the computer that has its port.",
+        "From here the machine is watched and held. Start it and clear alarms at the machine, or here after weeder serve --allow-start. Settings, calibration and teaching are for the computer that has its port.",
     watchAndStart:
         "From here the machine is watched, started and held. Settings, calibration and teaching are for the computer that has its port.",
 
@@ -351,7 +351,7 @@ export const heard = {
     noPermission: "Or you may not open it: `sudo usermod -aG dialout $USER`, then log in again.",
     noPort: "No port was chosen. Where the list has no Uno: plug it in, by a cable that carries data and not power alone.",
     noSerialServed:
-        "This page comes from weeder serve, which has the machines' ports itself and flashes nothing; and over plain http a browser gives no page a serial port. To flash, end it and run weeder flash there, or open the page's folder on that computer.",
+        "This page comes from weeder serve, which has the machines' ports itself and flashes nothing. To flash, end it and run weeder flash there, or open the page's folder on that computer.",
     noSerialHttp:
         "This page came over plain http, and over that a browser gives no page a serial port. Open the page's folder on the computer that has the Uno at its USB port, or serve it by https or from localhost.",
     noSerial:
@@ -360,9 +360,8 @@ export const heard = {
     // Texts of the session (host/page/src/session.rs), and of `weeder serve`.
     waitingForMachine: "Waiting for the machine to answer.",
     noneConnected: "no machine is connected",
-    mayBeDone: "{why}. This may have been done, or may still be done: look at the machine",
     servedLate: "this came more than a second late, so it was not sent: look at the machine, then try again",
-    servedUnknown: "{why}. The machine may have done this, or may still do it: look at it",
+    mayBeDone: "{why}. The machine may have done this, or may still do it: look at it",
     holdPending: "HOLD has not come through yet, so this was not sent",
     holdFirst: "hold came first, so this was not sent",
     waitedTooLong: "this waited for 3 s, so it was not sent: try again",
@@ -375,6 +374,7 @@ export const heard = {
         "it is not the weeder's firmware that answers, but \u201c{text}\u201d: choose another port, or flash this one",
     servedSilent:
         "the computer that has the machine's port does not answer: see that this device is in its network, and that weeder serve runs there",
+    servedOther: "the computer has started weeder serve again: save the log, then load this page again",
     servedDropped: "this page could not keep up with the machines' output: it connects again",
     unanswered: "no answer to `{command}` for {seconds} s: see to the Uno's cable and supply",
     servedGone: "the port is gone: plug the Uno in again",

@@ -42,9 +42,12 @@ fn without_the_code_a_phone_sees_nothing_and_does_nothing() {
     served.make_ready(0);
     assert_eq!(served.command(&served.here, "", "start").0, 200);
 
+    let (_, http_port) = served.lan.split_once(':').expect("it has a port");
+    let named = |cookie: &str| cookie.replace('=', &format!("-{http_port}="));
     for cookie in
         ["", "weeder=", &format!("weeder={}", "0".repeat(64)), "weeder=; weeder=1", &format!("weeder={}", served.code)]
     {
+        let cookie = &named(cookie);
         for path in ["/?served", "/"] {
             let (status, said) = served.get(&served.lan, path, cookie);
             assert!(status == 200 && said.contains("The code on the computer") && !said.contains("the page"), "{said}");
