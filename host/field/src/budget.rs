@@ -33,7 +33,8 @@ pub enum Part {
     Guarded,
     /// Open ground that the tool did not weed: it swung, or was about to.
     Swings,
-    /// Ground that the beam had not seen, or that was lost to a hold, an alarm, or an encoder in doubt.
+    /// Ground that the beam had not seen, or that was lost to a hold, an alarm, an encoder in doubt, or a machine that is
+    /// too fast for its beam.
     Closed,
 }
 
@@ -53,7 +54,7 @@ impl Part {
             Self::Plants => "stem zones and canopies",
             Self::Weeds => "tall weeds and unknowns kept",
             Self::Guarded => "guarded ground",
-            Self::Closed => "unseen ground, holds, alarms",
+            Self::Closed => "unseen, too fast, holds, alarms",
             Self::Weeded | Self::Margins | Self::Swings => self.into(),
         }
     }

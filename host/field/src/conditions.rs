@@ -89,12 +89,6 @@ impl Conditions {
 
     /// Whether every value is in its range, and the sweeps keep off the crop.
     fn check(&self) -> Result<(), WrongValue> {
-        let in_range = |name: String, value: f64| match range(&name) {
-            None => Err(WrongValue::unknown(&name)),
-            // A number that is none is in no range.
-            Some((least, greatest, _)) if (least..=greatest).contains(&value) => Ok(()),
-            Some((least, greatest, meaning)) => Err(WrongValue::out_of_range(name, value, (least, greatest), meaning)),
-        };
         self.values().try_for_each(|(parameter, value)| in_range(parameter.name.to_owned(), value))?;
         self.check_sweeps()?;
         self.check_beams()?;
@@ -159,13 +153,14 @@ impl Conditions {
     /// # Errors
     /// If the name is unknown, or the value is out of range.
     pub fn set(&mut self, parameter: &str, value: f64) -> Result<(), WrongValue> {
-        let whole = || {
-            let is_whole = value.fract() == 0.0 && value.abs() < f64::from(u32::MAX);
-            is_whole.then_some(value as i64).ok_or_else(|| WrongValue::not_whole(parameter, value))
-        };
+        let is_setting = Setting::find(parameter.as_bytes()).is_some();
+        // A conversion would change a value that is out of range.
+        in_range(if is_setting { format!("settings.{parameter}") } else { parameter.to_owned() }, value)?;
+        let is_whole = value.fract() == 0.0;
+        let whole = || is_whole.then_some(value as i64).ok_or_else(|| WrongValue::not_whole(parameter, value));
         let mut changed = self.clone();
-        if Setting::find(parameter.as_bytes()).is_some() {
-            changed.settings.insert(parameter.to_owned(), u16::try_from(whole()?).unwrap_or(u16::MAX));
+        if is_setting {
+            changed.settings.insert(parameter.to_owned(), whole()? as u16);
         } else {
             let unknown = || WrongValue::unknown(parameter);
             let mut tables = toml::Table::try_from(&*self).map_err(|_| unknown())?;
@@ -256,6 +251,16 @@ fn range(name: &str) -> Option<(f64, f64, String)> {
     Some((parameter.least, parameter.greatest, parameter.meaning.to_owned()))
 }
 
+/// Whether a value of a parameter, or of a setting behind `settings.`, is in its range.
+fn in_range(name: String, value: f64) -> Result<(), WrongValue> {
+    match range(&name) {
+        None => Err(WrongValue::unknown(&name)),
+        // A number that is none is in no range.
+        Some((least, greatest, _)) if (least..=greatest).contains(&value) => Ok(()),
+        Some((least, greatest, meaning)) => Err(WrongValue::out_of_range(name, value, (least, greatest), meaning)),
+    }
+}
+
 #[cfg(test)]
 impl Conditions {
     /// The conditions of a preset, with other values of some parameters.
@@ -328,6 +333,22 @@ mod tests {
         assert!(said.starts_with("no-such-field is none of the presets (transplanted, even-stand"), "{said}");
         let said = Conditions::load("walkd").unwrap_err().to_string();
         assert!(said.contains("did you mean walked?"), "{said}");
+    }
+
+    #[test]
+    fn a_value_that_cannot_be_set_is_named_as_it_was_given() {
+        let mut conditions = Conditions::default();
+        for (name, value, error) in [
+            ("margin_mm", -5.0, "settings.margin_mm is -5, but has to be 0 to 200"),
+            ("margin_mm", 65_636.0, "settings.margin_mm is 65636, but has to be 0 to 200"),
+            ("margin_mm", 4_294_967_396.0, "settings.margin_mm is 4294967396, but has to be 0 to 200"),
+            ("margin_mm", 1.5, "margin_mm is 1.5, but has to be a whole number"),
+            ("plot.rows", -1.0, "plot.rows is -1, but has to be 1 to 1000"),
+            ("machine.arm", 2.0, "machine.arm is 2, but has to be 0 to 1"),
+        ] {
+            let said = conditions.set(name, value).unwrap_err().to_string();
+            assert!(said.starts_with(error), "{said}");
+        }
     }
 
     #[test]

@@ -34,7 +34,7 @@ pub(crate) fn spans_where(mut ends: Vec<f64>, holds_at: impl Fn(f64) -> bool) ->
 
 /// The value at a place on the straight lines between knots, which are in ascending order. Beyond the outermost knots
 /// it stays as it is there. `None` without a knot.
-pub(crate) fn interpolated(knots: &[(f64, f64)], place: f64) -> Option<f64> {
+pub fn interpolated(knots: &[(f64, f64)], place: f64) -> Option<f64> {
     let next = knots.partition_point(|(knot, _)| *knot <= place);
     match (next.checked_sub(1).map(|last| knots[last]), knots.get(next)) {
         (Some((from, before)), Some((to, beyond))) => Some(before + (beyond - before) * ((place - from) / (to - from))),

@@ -8,7 +8,7 @@ use crate::budget::Reason;
 use crate::conditions::{Conditions, Mechanism};
 use crate::machine::{Dirt, Machine};
 use crate::motion::{Motion, run_up_mm};
-use crate::row::Row;
+use crate::row::{Row, Stem};
 use crate::servo::{Scatter, Servo};
 use crate::verdict::Timing;
 use control::ground::features;
@@ -90,15 +90,26 @@ impl Pass {
         Self { row, machine, motion, timing, start: Start::Command, settings: Vec::new(), examples: Vec::new() }
     }
 
+    /// The firmware's own calculation of how long it sees a plant before the tool is out: the lead, an eighth of it, and
+    /// the sensor's response.
+    fn notice_s(&self) -> f64 {
+        f64::from(self.timing.lead_out_ms) * 1.125e-3 + 0.002
+    }
+
+    /// The speed from which on the firmware keeps the tool out of the row: a plant just behind the last beam would reach
+    /// the tool before the tool is out.
+    pub fn too_fast_mm_s(&self) -> f64 {
+        let Machine { beam_to_tool_mm, second_beam_mm, .. } = self.machine;
+        (beam_to_tool_mm - second_beam_mm.max(self.timing.margin_mm.into())) / self.notice_s()
+    }
+
     /// The firmware's settings, in an order without intermediate contradictions.
     pub fn firmware_settings(&self) -> Vec<(Setting, u16)> {
         let Machine { wheel_mm, ticks_per_rev, beam_to_tool_mm, second_beam_mm, servo, .. } = self.machine;
         let Timing { margin_mm, lead_out_ms, lead_in_ms, .. } = self.timing;
         let notice_mm = beam_to_tool_mm - f64::from(margin_mm) - 2.0;
-        // The firmware's own calculation: the lead, an eighth of it, and the sensor's response.
-        let notice_s = f64::from(lead_out_ms) * 1.125e-3 + 0.002;
         let wanted_mm_s = (1.25 * self.motion.top_speed_mm_s()).max(SLOWEST_TOP_SPEED_MM_S);
-        let top_speed_mm_s = wanted_mm_s.min(notice_mm / notice_s).min(TOP_SPEED_MM_S);
+        let top_speed_mm_s = wanted_mm_s.min(notice_mm / self.notice_s()).min(TOP_SPEED_MM_S);
         let mut settings = vec![
             (Setting::TopSpeedMmS, SLOWEST_TOP_SPEED_MM_S as u16),
             (Setting::TicksPerRev, ticks_per_rev as u16),
@@ -166,6 +177,14 @@ impl Conditions {
         }
     }
 
+    /// The pass of a row at one speed, with this crop's zone round each stem. The seed is that of [`Self::machine`].
+    pub fn pass_at_speed(&self, mut row: Row, speed_mm_s: f64, seed: u64) -> Pass {
+        let protected_mm = self.crop.protected_mm / 2.0;
+        row.stems = Some(row.plants().map(|plant| Stem { protected_mm, ..Stem::at(plant.position_mm) }).collect());
+        let pass = Pass::at_speed(row, self.machine(seed), self.timing(), speed_mm_s);
+        Pass { settings: self.firmware_settings(), ..pass }
+    }
+
     /// A setting of the firmware, or what it is otherwise.
     fn setting_or(&self, setting: Setting, otherwise: f64) -> f64 {
         self.settings.get(&setting.text().to_string()).map_or(otherwise, |&value| value.into())
@@ -183,11 +202,33 @@ impl Conditions {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::row::Canopy;
 
     #[test]
     fn a_calibrated_wheel_is_set_after_its_diameter_which_would_reset_it() {
         let conditions = Conditions::with("transplanted", &[("ticks_per_m", 2010.0), ("wheel_mm", 400.0)]);
         assert_eq!(conditions.firmware_settings(), [(Setting::WheelMm, 400), (Setting::TicksPerM, 2010)]);
+    }
+
+    #[test]
+    fn the_zone_round_each_stem_is_the_field_s() {
+        let conditions = Conditions::with("maize", &[("crop.protected_mm", 40.0)]);
+        let row = Row::new(vec![Canopy::plant(500.0, 20.0), Canopy::weed(600.0, 9.0), Canopy::plant(700.0, 20.0)]);
+        let stems = conditions.pass_at_speed(row.unwrap(), 500.0, 1).row.stems();
+        let zones: Vec<(f64, f64)> = stems.iter().map(|stem| (stem.along_mm, stem.protected_mm)).collect();
+        assert_eq!(zones, [(500.0, 20.0), (700.0, 20.0)]);
+    }
+
+    #[test]
+    fn the_last_beam_limits_the_speed() {
+        // 200 mm behind the second beam, in nine eighths of 116 ms and 2 ms.
+        let too_fast_mm_s = |changes: &[(&str, f64)]| {
+            let row = Row::new(vec![Canopy::plant(500.0, 150.0)]).unwrap();
+            Conditions::with("walked", changes).pass_at_speed(row, 500.0, 1).too_fast_mm_s().round()
+        };
+        assert_eq!(too_fast_mm_s(&[]), 1509.0);
+        // Without it, the margin is kept too.
+        assert_eq!(too_fast_mm_s(&[("machine.second_beam_mm", 0.0)]), 2853.0);
     }
 
     #[test]

@@ -35,7 +35,7 @@ pub struct Servo {
 /// How much the swings of a servo differ from each other.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Scatter {
-    /// The dead time lies within this of its mean, evenly spread.
+    /// The dead time lies within this of its mean, evenly spread, and is at least 0.
     pub dead_time_ms: f64,
     /// The soil's load, as a share of the stall torque, lies between 0 and this, evenly distributed.
     pub load: f64,
@@ -131,7 +131,7 @@ impl Servo {
             let heard_s = (command.fall_cycle as f64 - start_cycle as f64) / CYCLES_PER_SECOND as f64;
             let late_ms = scatter(&mut rng, dead_time_ms);
             let travel_ms = self.travel_ms * slowed(rng.random_range(0.0..=1.0) * load);
-            let begin_s = heard_s + (self.dead_time_ms + late_ms) / 1000.0;
+            let begin_s = heard_s + (self.dead_time_ms + late_ms).max(0.0) / 1000.0;
             let begin_degrees = interpolated(&corners, begin_s).unwrap_or(rest_degrees);
             // The new command cancels the corners after this time.
             corners.retain(|(time_s, _)| *time_s < begin_s);
@@ -215,6 +215,16 @@ mod tests {
         assert_degrees(&stroke, 0.3215, 22.5);
         assert_degrees(&stroke, 0.3815, 0.0);
         assert_degrees(&stroke, 9.0, 0.0);
+    }
+
+    #[test]
+    fn no_servo_moves_before_its_pulse_has_ended() {
+        for seed in 0..20 {
+            let scatter = Scatter { dead_time_ms: 200.0, load: 0.0, seed };
+            let servo = Servo { dead_time_ms: 5.0, scatter, ..Servo::default() };
+            let stroke = servo.stroke(&servo.commands(&frames(&[(10, 2000), (40, 1500)])), 0);
+            assert_degrees(&stroke, 0.2015, 45.0);
+        }
     }
 
     #[test]

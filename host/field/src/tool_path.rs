@@ -13,7 +13,7 @@
 //! paper's square metre. Most of them fall to the sweeps, under any controller. *Counted* are those that stand on the
 //! ground where weeds are counted.
 
-use crate::conditions::Mechanism;
+use crate::conditions::{Conditions, Mechanism};
 use crate::driving::Steering;
 use crate::machine::Machine;
 use crate::motion::Motion;
@@ -94,6 +94,15 @@ pub(crate) struct Swinging<'a> {
 /// Width of the strip, on each side of the row, between the tool in the row and the nearest sweep. No tool weeds it.
 pub fn unweeded_strip_mm(machine: &Machine, mechanism: &Mechanism) -> f64 {
     if mechanism.sweeps_a_side == 0 { 0.0 } else { (mechanism.sweep_from_mm - machine.tool_width_mm / 2.0).max(0.0) }
+}
+
+/// The weeded share of the ground from row to row, from 0 to 1: all that the sweeps pass, and beside them the tool's
+/// width over `weeded_share` of the row's length.
+pub fn share_from_row_to_row(conditions: &Conditions, weeded_share: f64) -> f64 {
+    let swept = conditions.machine.swept_mm();
+    let swept_until_mm = |across_mm: f64| across_mm.min(swept.end) - across_mm.min(swept.start);
+    let (half_mm, tool_mm) = (conditions.plot.row_spacing_mm / 2.0, conditions.machine.tool_width_mm / 2.0);
+    (swept_until_mm(half_mm) + weeded_share * (tool_mm - swept_until_mm(tool_mm))) / half_mm
 }
 
 /// The effect of a machine with these servo pulses on a stand. The motion began at `start_cycle`.
@@ -330,6 +339,22 @@ pub(crate) mod tests {
         assert_eq!(unweeded_strip_mm(&Machine::default(), &mechanism), 22.5);
         let wide = Machine { tool_width_mm: 100.0, ..Machine::default() };
         assert_eq!(unweeded_strip_mm(&wide, &mechanism), 0.0);
+    }
+
+    #[test]
+    fn the_ground_from_row_to_row_has_unweeded_strips_only_between_tool_and_sweeps() {
+        for (changes, percent) in [
+            // The sweeps take 300 of the 400 mm, and the tool half of its 55 mm.
+            (&[][..], 81.875),
+            // They meet, or the tool reaches under the sweeps.
+            (&[("machine.tool_width_mm", 100.0)][..], 87.5),
+            (&[("machine.tool_width_mm", 150.0)][..], 87.5),
+            (&[("plot.row_spacing_mm", 600.0), ("machine.sweeps_a_side", 3.0)][..], (480.0 + 27.5) / 6.0),
+            (&[("machine.sweeps_a_side", 0.0), ("machine.tool_width_mm", 150.0)][..], 18.75),
+        ] {
+            let share = share_from_row_to_row(&Conditions::with("from-the-box", changes), 0.5);
+            assert!((100.0 * share - percent).abs() < 1e-9, "{changes:?}: {share}");
+        }
     }
 
     #[test]

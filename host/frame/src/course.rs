@@ -33,8 +33,8 @@ pub struct CourseArguments {
     /// Distance from the beam back to the tool in mm, 100 to 2000. Default: the field's, 400.
     #[arg(long, value_parser = whole_within(100..=2000_u32))]
     beam_to_tool: Option<u32>,
-    /// Machine, settings and wheel slip: a preset such as walked, from-the-box or paper, or a TOML file as for
-    /// `weeder trial`; - for standard input.
+    /// Machine, settings, zones round stems and wheel slip. A preset such as walked, from-the-box or paper, or a TOML
+    /// file as for `weeder trial`; - for standard input.
     #[arg(long, value_name = "PRESET|FILE.toml", value_parser = source::preset_or_file(), hide_possible_values = true, default_value = conditions::DEFAULT)]
     pub field: String,
     /// Grow canopies with gaps for the beam.

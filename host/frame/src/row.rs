@@ -96,9 +96,7 @@ impl Arguments {
 fn weed(arguments: &Arguments, row: Row, folder: Option<&OutFolder>, vcd: Option<&OutFile>) -> Result<Finding> {
     let course = &arguments.course;
     let conditions = course.conditions_of(arguments.field())?;
-    let mut pass =
-        Pass::at_speed(row, conditions.machine(course.seed), conditions.timing(), mm_s(arguments.course.speed));
-    pass.settings = conditions.firmware_settings();
+    let mut pass = conditions.pass_at_speed(row, mm_s(course.speed), course.seed);
     pass.motion = pass.motion.with_slip(|| conditions.ground.slip_percent / 100.0);
     let elf = arguments.elf.clone().map_or_else(firmware::build, Ok)?;
     // The memory is printed, and a HEX file does not tell it.
@@ -111,7 +109,7 @@ fn weed(arguments: &Arguments, row: Row, folder: Option<&OutFolder>, vcd: Option
     }
     let outcome = with_bar("weeding", |show| uno_run::run(&pass, &elf, show))?;
 
-    let totals = report::totals(&pass, &outcome);
+    let totals = report::totals(&pass, &conditions, &outcome);
     let printed = if arguments.json {
         say!("{:#}", in_json(arguments, &pass, &outcome))
     } else if arguments.totals {
@@ -165,6 +163,7 @@ fn in_json(arguments: &Arguments, pass: &Pass, outcome: &Outcome) -> Value {
         "true_position_ticks": outcome.true_ticks,
         "lost_ticks": outcome.status.lost_ticks,
         "state": outcome.status.state,
+        "alarm": outcome.status.alarm,
         "row_mm": [pass.row.span_mm().start, pass.row.span_mm().end],
         "plants": report::plants(outcome),
         "weeds": report::weeds(outcome),

@@ -303,14 +303,19 @@ impl Machine {
         let reduction = eq::chain_reduction(self.engine.speed, ratio, wheel_speed);
         let teeth = eq::driven_teeth(self.chain.drive_teeth, reduction);
         if !(1.0..=f64::from(MOST_TEETH)).contains(&teeth) {
+            let gear_box_ratio = ratio * teeth / f64::from(USUAL_TEETH);
+            let right = Self { engine: Engine { gear_box_ratio, ..self.engine }, ..*self };
+            let (key, advice) = match right.check() {
+                Ok(()) => ("gear_box_ratio", format!("at these speeds a ratio near {} makes", digits(gear_box_ratio))),
+                Err(_) => ("speed", "change engine.speed, weeder.speed or wheel.diameter: no ratio makes".to_owned()),
+            };
             let problem = format!(
                 "engine.gear_box_ratio is {}: the driven sprocket would need {} teeth and can have 1 to {MOST_TEETH}; \
-                 at these speeds a ratio near {} makes it {USUAL_TEETH} teeth",
+                 {advice} it {USUAL_TEETH} teeth",
                 digits(ratio),
-                digits(teeth),
-                digits(ratio * teeth / f64::from(USUAL_TEETH))
+                digits(teeth)
             );
-            return error("engine", "gear_box_ratio", problem);
+            return error("engine", key, problem);
         }
         Ok(())
     }

@@ -3,8 +3,8 @@
 //! The angle is the smallest that clears the widest canopy, or the zone round a stem. Its time follows from the servo's
 //! torque-speed line. A shorter stroke takes less time and leaves more ground weeded. With a stem zone, its settings
 //! follow as well. The zone is longer than the protected width, because a stem may stand off the middle. Its leads are
-//! shorter, by what its circle allows at the firmware's default top speed. The margin covers a wheel and a servo that
-//! were not measured yet.
+//! shorter, by what its circle allows at the top speed. The margin covers a wheel and a servo that were not measured yet.
+//! Top speed and gap between pulses are the board's, or the firmware's defaults.
 //!
 //! The arm swings sideways about a pivot beside the row: at an angle the tool's middle is `arm * sin(angle)` from the
 //! row's line. A servo turns at full speed without load. Its speed falls in a straight line to zero at the stall
@@ -18,8 +18,11 @@ use set_up::{circle, saved_ms};
 use uom::si::f64::{Time, Torque};
 use uom::si::time::second;
 
-/// The most that a pulse and the gap after it delay a command, ms.
-const PULSE_AND_GAP_MS: f64 = 6.0;
+/// The most that a pulse delays a command, besides the gap after it, ms.
+const PULSE_MS: f64 = 3.0;
+
+/// The most that fixed frames delay it, without a shortest gap, ms.
+const FRAME_MS: f64 = 20.0;
 
 /// Pulses are whole steps of this, us, rounded outwards.
 const PULSE_STEP_US: f64 = 5.0;
@@ -61,25 +64,33 @@ impl Swing {
     /// # Errors
     /// If the arm is too short, or the servo too weak or too slow, in words.
     pub fn of(machine: &Machine, torque: Torque) -> Result<Self, String> {
-        Self::with_tool(machine, torque, MM.value(machine.intra_row.width), machine.swing.pulse_in, true)
+        Self::fitted(machine, torque, &Settings::new())
     }
 
-    /// The same from where a board's tool was fitted in the row, and to the same side. Settings with the default pulses
-    /// tell neither.
+    /// The same with a board's gap and top speed, from where its tool was fitted in the row, and to the same side. Settings
+    /// with the default pulses tell neither.
     ///
     /// # Errors
     /// As [`of`](Self::of).
     pub fn fitted(machine: &Machine, torque: Torque, settings: &Settings) -> Result<Self, String> {
         let pulses = [Setting::ServoInUs, Setting::ServoOutUs];
+        let tool_mm = MM.value(machine.intra_row.width);
         if pulses.iter().all(|&pulse| settings.get(pulse) == pulse.description().default) {
-            return Self::of(machine, torque);
+            return Self::with_tool(machine, torque, settings, tool_mm, machine.swing.pulse_in, true);
         }
         let [in_us, out_us] = pulses.map(|pulse| f64::from(settings.get(pulse)));
-        Self::with_tool(machine, torque, MM.value(machine.intra_row.width), in_us, in_us <= out_us)
+        Self::with_tool(machine, torque, settings, tool_mm, in_us, in_us <= out_us)
     }
 
     /// The same with a tool of another width in mm, from this pulse in us, and with longer or shorter pulses.
-    fn with_tool(machine: &Machine, torque: Torque, tool_mm: f64, in_us: f64, is_longer: bool) -> Result<Self, String> {
+    fn with_tool(
+        machine: &Machine,
+        torque: Torque,
+        settings: &Settings,
+        tool_mm: f64,
+        in_us: f64,
+        is_longer: bool,
+    ) -> Result<Self, String> {
         let inputs = machine.swing;
         let arm_mm = MM.value(machine.intra_row.shank_length);
         let aside_mm = kept_mm(machine) / 2.0 + MM.value(inputs.room) + tool_mm / 2.0;
@@ -104,10 +115,12 @@ impl Swing {
         let loaded_ms = unloaded_ms / (1.0 - load);
         let dead_ms = |time: Time| 1000.0 * time.get::<second>();
         let from_mm = MM.value(inputs.sweep_from);
-        let lead_out_ms = dead_ms(inputs.most_dead_time.max(inputs.least_dead_time)) + loaded_ms + PULSE_AND_GAP_MS;
+        let gap_ms = settings.get(Setting::ServoGapMs);
+        let wait_ms = PULSE_MS + if gap_ms == 0 { FRAME_MS } else { f64::from(gap_ms) };
+        let lead_out_ms = dead_ms(inputs.most_dead_time.max(inputs.least_dead_time)) + loaded_ms + wait_ms;
         let protected_mm = MM.value(inputs.protected);
         let stem_zone_mm = if protected_mm > 0.0 { protected_mm + MM.value(inputs.stem_off) } else { 0.0 };
-        let top_speed_mm_s = f64::from(Setting::TopSpeedMmS.description().default);
+        let top_speed_mm_s = f64::from(settings.get(Setting::TopSpeedMmS));
         let aside_of_stroke_mm = arm_mm * angle_degrees.to_radians().sin();
         let stroke_mm = arm_mm * (1.0 - angle_degrees.to_radians().cos());
         // Over a whole canopy the tool is fully out.
@@ -204,7 +217,7 @@ impl Swing {
             return said;
         }
         let (in_us, is_longer) = (f64::from(self.servo_in_us), self.servo_in_us <= self.servo_out_us);
-        let wider = Self::with_tool(machine, torque, self.filling_tool_mm, in_us, is_longer);
+        let wider = Self::with_tool(machine, torque, &Settings::new(), self.filling_tool_mm, in_us, is_longer);
         said.push(format!(
             "Between tool and sweeps {:.1} mm on either side of the row are not weeded: a tool of {:.0} mm would fill that{}.",
             self.unweeded_strip_mm,
@@ -278,6 +291,23 @@ mod tests {
             let sentences = narrow.sentences(&machine, KG_CM.of(10.0)).join(" ");
             assert!(sentences.contains(&format!("`set servo_out_us {}`", pulses[1])), "{sentences}");
         }
+    }
+
+    #[test]
+    fn fixed_frames_and_a_higher_top_speed_of_the_board_need_safer_leads() {
+        let leads = |machine: &Machine, setting: Setting, value: u16| {
+            let mut settings = Settings::new();
+            settings.set(setting, value).expect("it is in its range");
+            let swing = Swing::fitted(machine, KG_CM.of(10.0), &settings).expect("it swings");
+            (swing.lead_out_ms, swing.lead_in_ms)
+        };
+        let mut machine = with_tool_of_100_mm();
+        let (out_ms, in_ms) = leads(&machine, Setting::ServoGapMs, 3);
+        assert_eq!(leads(&machine, Setting::ServoGapMs, 0), (out_ms + 17, in_ms));
+        machine.swing.protected = MM.of(90.0);
+        let (out_ms, in_ms) = leads(&machine, Setting::TopSpeedMmS, 1300);
+        let (fast_out_ms, fast_in_ms) = leads(&machine, Setting::TopSpeedMmS, 2000);
+        assert!(fast_out_ms > out_ms && fast_in_ms < in_ms, "{fast_out_ms} {fast_in_ms}");
     }
 
     #[test]

@@ -6,9 +6,11 @@
 use drawing::{INK, LEFT_ALONE, MARK_SIZE, NOTE, PALE_INK, PLANT, WEED, WEEDED, WRONG};
 use drawing::{Legend, document, line, rectangle, swatch, tenth, words};
 use field::conditions::Arm;
+use field::ground::interpolated;
 use field::machine::Machine;
 use field::row::Row;
 use field::verdict::{Judgement, Verdict};
+use std::iter;
 use svg::Document;
 use svg::node::Node;
 use svg::node::element::{Animate, AnimateTransform, Circle, ClipPath, Definitions, Group};
@@ -74,17 +76,15 @@ pub fn draw(row: &Row, machine: &Machine, judgement: &Judgement, speed_mm_s: f64
         Arm::Pendulum => 0.0,
         Arm::Trailing => pixels(machine.arm_mm),
     };
-    let mut swings: Vec<(f64, [f64; 2])> = Vec::new();
-    for &(position_mm, degrees) in &judgement.path {
-        let at = share(position_mm);
-        if swings.last().is_none_or(|(last, _)| *last < at) {
-            swings.push((at, [machine.forward_mm(degrees), 0.0 - machine.across_mm(degrees)].map(pixels)));
-        }
-    }
-    if let (Some(&(_, first)), Some(&(_, last))) = (swings.first(), swings.last()) {
-        swings.insert(0, (0.0, first));
-        swings.push((1.0, last));
-    }
+    // The machine's position at each point of the path. Its arm may have carried the tool forward.
+    let path: Vec<(f64, f64)> =
+        judgement.path.iter().map(|&(tool_mm, degrees)| (tool_mm - machine.forward_mm(degrees), degrees)).collect();
+    let [start, end] = [ground.start, ground.end].map(|mm| (mm, interpolated(&path, mm).unwrap_or(0.0)));
+    let between = path.into_iter().filter(|(mm, _)| start.0 < *mm && *mm < end.0);
+    let swing = |(mm, degrees): (f64, f64)| {
+        (share(mm), [machine.forward_mm(degrees), 0.0 - machine.across_mm(degrees)].map(pixels))
+    };
+    let swings: Vec<(f64, [f64; 2])> = iter::once(start).chain(between).chain([end]).map(swing).collect();
     let each = |text: fn(&[f64; 2]) -> String| swings.iter().map(|(at, way)| (*at, text(way))).collect::<Vec<_>>();
     let width = pixels(machine.tool_width_mm);
     let blade = rectangle(-5.0, ROW_Y - width / 2.0, 10.0, width, NOTE)
@@ -169,9 +169,13 @@ mod tests {
     use super::*;
     use crate::report::tests::ruined_row;
 
+    /// The tool swings in and out over 40 mm, half way at either end of the row's ground.
     fn drawn(arm: Arm) -> String {
-        let (pass, outcome) = ruined_row();
-        draw(&pass.row, &Machine { arm, ..pass.machine }, &outcome.judgement, 500.0).to_string()
+        let (pass, mut outcome) = ruined_row();
+        let machine = Machine { arm, ..pass.machine };
+        let points = [(-150.0, 45.0), (230.0, 45.0), (270.0, 0.0), (1230.0, 0.0), (1270.0, 45.0), (1400.0, 45.0)];
+        outcome.judgement.path = points.map(|(mm, degrees)| (mm + machine.forward_mm(degrees), degrees)).to_vec();
+        draw(&pass.row, &machine, &outcome.judgement, 500.0).to_string()
     }
 
     #[test]
@@ -181,15 +185,15 @@ mod tests {
         let (_, blade) = drawn.split_once("type=\"translate\"").unwrap();
         let values = blade.split("values=\"").nth(1).unwrap().split('"').next().unwrap();
         let ways: Vec<&str> = values.split(';').collect();
-        // Out at first, and in the row from then on. A pendulum of 350 mm is 247.5 mm aside at 45 degrees.
-        assert_eq!((ways.first(), ways.last()), (Some(&"0 -89.1"), Some(&"0 0")));
+        // At the row's ends, not the path's. A pendulum of 350 mm is 133.9 mm aside at 22.5 degrees.
+        assert_eq!(ways, ["0 -48.2", "0 0", "0 0", "0 -48.2"]);
     }
 
     #[test]
     fn a_trailing_arm_carries_the_tool_forward_from_a_pivot_ahead_of_it() {
         let drawn = drawn(Arm::Trailing);
-        // 102.5 mm forward.
-        assert!(drawn.contains("values=\"36.9 -89.1;"), "{drawn}");
+        // 26.6 mm forward.
+        assert!(drawn.contains("values=\"9.6 -48.2;0 0;"), "{drawn}");
     }
 
     #[test]

@@ -6,7 +6,7 @@
 //! port of the link.
 
 use field::native::Refused;
-use link::{Counts, LineReader};
+use link::{Counts, LineReader, advice};
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
 use thiserror::Error;
@@ -78,6 +78,8 @@ pub fn ask(uno: &mut Uno, command: &str) -> Result<Vec<String>, ConsoleError> {
 pub struct Status {
     /// `hold`, `work` or `alarm`.
     pub state: String,
+    /// Its alarm, as `3-1 too_fast`.
+    pub alarm: Option<String>,
     /// Net encoder counts since power-up.
     pub position_ticks: i64,
     /// Encoder counts that the firmware knows to have lost.
@@ -98,6 +100,7 @@ impl Status {
         let (status, counts) = parsed.ok_or(ConsoleError::Status(lines))?;
         Ok(Self {
             state: status.mode.name().to_owned(),
+            alarm: status.alarm.map(advice::name),
             position_ticks: status.position.into(),
             lost_ticks: counts.lost.into(),
         })

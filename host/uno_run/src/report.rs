@@ -5,17 +5,17 @@
 use crate::console::Status;
 use crate::run::Outcome;
 use comfy_table::{Attribute, Cell, CellAlignment, Color, Row, Table, presets};
+use field::conditions::Conditions;
 use field::counted;
 use field::machine::Machine;
+use field::motion::mm_s;
 use field::pass::Pass;
+use field::tool_path::share_from_row_to_row;
 use field::verdict::{Judgement, PlantOutcome, Verdict, WeedOutcome};
 use serde::Serialize;
 use std::fmt::Write;
 use std::io;
 use uno::elf::Size;
-
-/// Width that the machine weeds with its inter-row tools (the paper's chapter on the tines: 40 cm).
-const WORKING_WIDTH_MM: f64 = 400.0;
 
 /// Flash that the Uno's bootloader leaves, and SRAM, of the ATmega328P (its data sheet, section 8).
 const FLASH_BYTES: u64 = 32_768 - 512;
@@ -78,7 +78,7 @@ fn verdict_cell(verdict: Verdict) -> Cell {
 }
 
 /// The totals, a paragraph in plain words.
-pub fn totals(pass: &Pass, outcome: &Outcome) -> String {
+pub fn totals(pass: &Pass, conditions: &Conditions, outcome: &Outcome) -> String {
     let Outcome { judgement, status, .. } = outcome;
     let plants = judgement.plants.len();
     let kept = if pass.timing.stem_zone_mm == 0 { "canopy" } else { "stem zone" };
@@ -122,10 +122,9 @@ pub fn totals(pass: &Pass, outcome: &Outcome) -> String {
             judgement.weedable_share * 100.0,
         ),
     );
-    // As the paper counted weeds: all ground beside the row, and the weeded part of the tool's width.
-    let strip_share = 1.0 - (1.0 - judgement.weeded_share) * pass.machine.tool_width_mm / WORKING_WIDTH_MM;
-    let strip = format!("{:.1} % of the {WORKING_WIDTH_MM:.0} mm strip", strip_share * 100.0);
-    line("", format!("({strip} that the inter-row tools weed along with it)"));
+    // As the paper counted weeds.
+    let percent = 100.0 * share_from_row_to_row(conditions, judgement.weeded_share);
+    line("", format!("({percent:.1} % of the {} mm from row to row, with the sweeps)", conditions.plot.row_spacing_mm));
     line("Swings", swing_words(judgement, &pass.machine));
     if outcome.stray_pulses > 0 {
         let pulses = counted(outcome.stray_pulses, "pulse");
@@ -133,7 +132,11 @@ pub fn totals(pass: &Pass, outcome: &Outcome) -> String {
     }
     line("Encoder", count_words(outcome));
     if status.state != "work" {
-        line("Firmware", format!("ended in `{}`, not at work", status.state));
+        let alarm = status.alarm.as_ref().map(|alarm| format!(" {alarm}")).unwrap_or_default();
+        line("Firmware", format!("ended in `{}`{alarm}, not at work", status.state));
+    } else if pass.motion.top_speed_mm_s() >= pass.too_fast_mm_s() {
+        let km_h = pass.too_fast_mm_s() / mm_s(1.0);
+        line("Firmware", format!("too fast for its beam: from {km_h:.1} km/h on the tool stays out"));
     }
     let Size { flash, sram } = outcome.size;
     line("Memory", format!("{flash} of {FLASH_BYTES} bytes of flash, {sram} of {SRAM_BYTES} bytes of SRAM"));
@@ -169,8 +172,8 @@ fn swing_words(judgement: &Judgement, machine: &Machine) -> String {
 fn count_words(outcome: &Outcome) -> String {
     let off = outcome.status.position_ticks - outcome.true_ticks;
     let place = match off {
-        0 => "exactly where the machine is".to_owned(),
-        off => format!("{off:+} from where the machine is"),
+        0 => "exactly the wheel's".to_owned(),
+        off => format!("{off:+} from the wheel's"),
     };
     let Status { position_ticks, lost_ticks, .. } = outcome.status;
     format!("position {}, {place}; {} lost", counted(position_ticks, "tick"), counted(lost_ticks, "count"))
@@ -258,7 +261,6 @@ pub fn introduction(Pass { row, machine, motion, .. }: &Pass) -> String {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use field::motion::mm_s;
     use field::row::Canopy;
     use field::verdict::{Timing, judge};
     use uno::{CYCLES_PER_SECOND, Pulse};
@@ -272,7 +274,7 @@ pub(crate) mod tests {
         let pulses = vec![frame(0, 2000), frame(CYCLES_PER_SECOND, 1500)];
         let outcome = Outcome {
             judgement: judge(&pass.row, &pass.machine, &pass.motion, pass.timing, &pulses, 0),
-            status: Status { state: "work".to_owned(), position_ticks: 99, lost_ticks: 2 },
+            status: Status { state: "work".to_owned(), alarm: None, position_ticks: 99, lost_ticks: 2 },
             true_ticks: 101,
             size: Size { flash: 20_000, sram: 800 },
             pulses,
@@ -286,14 +288,15 @@ pub(crate) mod tests {
     #[test]
     fn the_totals_are_in_plain_words() {
         let (pass, outcome) = ruined_row();
-        let totals = totals(&pass, &outcome);
+        let totals = totals(&pass, &Conditions::default(), &outcome);
         for words in [
             "2: 2 damaged, 0 whose zone was reached, 0 with the margin cut, 0 kept",
             "the tool reached 150 mm into the canopy that it reached farthest",
             "1 of 1 cut",
             "100.0 % of the row's 1.00 m",
+            "88.8 % of the 400 mm from row to row, with the sweeps",
             "none was commanded for a plant",
-            "position 99 ticks, -2 from where the machine is; 2 counts lost",
+            "position 99 ticks, -2 from the wheel's; 2 counts lost",
             "20000 of 32256 bytes of flash, 800 of 2048 bytes of SRAM",
         ] {
             assert!(totals.contains(words), "{words:?} is not in\n{totals}");
@@ -304,15 +307,28 @@ pub(crate) mod tests {
     fn singular_and_plural_differ() {
         let (pass, mut outcome) = ruined_row();
         (outcome.stray_pulses, outcome.judgement.idle_swings, outcome.status.lost_ticks) = (1, 1, 1);
-        let words = totals(&pass, &outcome);
+        let words = totals(&pass, &Conditions::default(), &outcome);
         assert!(words.contains("swung out 1 time for no plant"), "{words}");
         assert!(words.contains("1 pulse of a width that no servo knows: ignored"), "{words}");
         assert!(words.contains("; 1 count lost"), "{words}");
         outcome.stray_pulses = 2;
-        let words = totals(&pass, &outcome);
+        let words = totals(&pass, &Conditions::default(), &outcome);
         assert!(words.contains("2 pulses of a width that no servo knows: ignored"), "{words}");
         let introduction = introduction(&pass);
         assert!(introduction.starts_with("2 plants and 1 tall weed on 1.00 m of row"), "{introduction}");
+    }
+
+    #[test]
+    fn the_cause_of_a_tool_that_stayed_out_is_named() {
+        let (mut pass, mut outcome) = ruined_row();
+        let words = |pass: &Pass, outcome: &Outcome| totals(pass, &Conditions::default(), outcome);
+        assert!(!words(&pass, &outcome).contains("Firmware"));
+        pass.motion = Pass::at_speed(pass.row.clone(), pass.machine, pass.timing, 4.0 * pass.too_fast_mm_s()).motion;
+        let too_fast = format!("from {:.1} km/h on the tool stays out", pass.too_fast_mm_s() * 0.0036);
+        assert!(words(&pass, &outcome).contains(&too_fast), "{too_fast}");
+        (outcome.status.state, outcome.status.alarm) = ("alarm".to_owned(), Some("3-1 too_fast".to_owned()));
+        assert!(words(&pass, &outcome).contains("ended in `alarm` 3-1 too_fast, not at work"));
+        assert!(!words(&pass, &outcome).contains("for its beam"));
     }
 
     #[test]

@@ -40,10 +40,7 @@ pub fn pass(plants: usize, weeds: usize, speed_km_h: f64) -> Result<Pass, CheckE
     let conditions = Conditions::preset(FIELD).ok_or_else(|| row(&FIELD))?.map_err(|error| row(&error))?;
     let planting = Planting { plants, canopy_scatter_mm: 22.5, weeds, ..Planting::default() };
     let stand = planting.grow_with_room(SEED).map_err(|error| row(&error))?;
-    let speed = field::motion::mm_s(speed_km_h);
-    let mut pass = Pass::at_speed(stand, conditions.machine(SEED), conditions.timing(), speed);
-    pass.settings = conditions.firmware_settings();
-    Ok(pass)
+    Ok(conditions.pass_at_speed(stand, field::motion::mm_s(speed_km_h), SEED))
 }
 
 /// A width this near to a setting of the servo counts as it, in us: the simulated servo follows any difference.

@@ -26,13 +26,14 @@ struct Correction {
 }
 
 #[rustfmt::skip]
-const CORRECTIONS: [Correction; 11] = [
+const CORRECTIONS: [Correction; 12] = [
     Correction { name: "interrupt_entry", section: "7.7.1", simavr: "0" },
     Correction { name: "interrupt_wakeup", section: "7.7.1", simavr: "1" },
     Correction { name: "uart_frame", section: "20.4", simavr: " 22" },
     Correction { name: "compare_buffer", section: "16.9.3", simavr: "1 1 1 2" },
     Correction { name: "counter_write", section: "16.7.2", simavr: "0 1" },
     Correction { name: "top_write", section: "16.6.3", simavr: "19999 9999" },
+    Correction { name: "top_running", section: "16.9.3", simavr: "1 15 0" },
     Correction { name: "reset_timer", section: "11.1", simavr: "-22697 204 2" },
     Correction { name: "watchdog_again", section: "11.9.2", simavr: "80" },
     Correction { name: "eeprom_write", section: "8.4.2", simavr: "0" },

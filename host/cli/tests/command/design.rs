@@ -136,6 +136,8 @@ fn a_friction_angle_of_90_degrees_is_refused_with_its_range() {
 #[test]
 fn a_gear_box_that_no_sprocket_fits_is_refused_with_one_that_would() {
     assert_no_machine("[engine]\ngear_box_ratio = 1\n", "a ratio near 38 makes it 40 teeth");
+    assert_no_machine("[engine]\nspeed = \"10 rpm\"\n", "my.toml, line 2: engine.gear_box_ratio is 40");
+    assert_no_machine("[engine]\nspeed = \"10 rpm\"\n", "change engine.speed, weeder.speed or wheel.diameter");
 }
 
 #[test]

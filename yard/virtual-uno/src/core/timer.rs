@@ -1,13 +1,15 @@
 //! Corrections of simavr's Timer1: ICR1, and OCR1A and TCNT1 for output A.
 //!
-//! Only modes with ICR1 as their top take a new one (data sheet, 16.6.3).
+//! Only modes with ICR1 as their top take a new one (data sheet, 16.6.3). In fast and phase-correct PWM a new one sets the
+//! running period (16.9.3). simavr reads ICR1 only when mode or clock change.
 //!
 //! simavr's writers of OCR1A and TCNT1 are replaced. In fast PWM a new OCR1A only changes the compare value of the next
 //! period (data sheet, 16.9.3). A write of TCNT1 moves the counter. simavr's own writer does this exactly, but with the
 //! pins disconnected and with the compare value of the running period's start. In other modes simavr's writers work
 //! alone.
 //!
-//! Only the non-inverting output A is corrected. A counter above its top restarts at the bottom, as in simavr.
+//! Only the non-inverting output A is corrected. A counter above its top restarts at the bottom, as in simavr, also above a
+//! new one.
 
 use super::chip::{Chip, Writer};
 use simavr_ffi as simavr;
@@ -74,10 +76,15 @@ impl Timer1 {
     fn is_buffered(&self, chip: Chip) -> bool {
         // SAFETY: as in `output_becomes`.
         let timer = unsafe { &*self.timer };
-        (1..=LAST_PRESCALER).contains(&(chip.read(TCCR1B) & CS1))
+        has_clock(chip)
             && timer.wgm_op_mode_kind == simavr::avr_timer_wgm_fast_pwm as i32
             && timer.mode.top() != simavr::avr_timer_wgm_reg_ocra
     }
+}
+
+/// Whether Timer1 runs from the chip's clock.
+fn has_clock(chip: Chip) -> bool {
+    (1..=LAST_PRESCALER).contains(&(chip.read(TCCR1B) & CS1))
 }
 
 /// Stops all timers, as a reset does. simavr's reset keeps their modes and periods. The chip must not be running.
@@ -119,12 +126,39 @@ pub(super) unsafe extern "C" fn on_top_write(avr: *mut simavr::avr_t, register: 
     // SAFETY: as in `on_compare_write`.
     unsafe {
         let (chip, timer1) = (Chip::of(avr), timer1.cast::<Timer1>());
-        if chip.read(TCCR1A) & WGM10 == 0 && chip.read(TCCR1B) & WGM13 != 0 {
-            (*timer1).top_high = chip.read(ICR1H);
-            chip.set(register, low);
-        } else {
-            chip.set(ICR1H, (*timer1).top_high);
+        if chip.read(TCCR1A) & WGM10 != 0 || chip.read(TCCR1B) & WGM13 == 0 {
+            return chip.set(ICR1H, (*timer1).top_high);
         }
+        (*timer1).top_high = chip.read(ICR1H);
+        chip.set(register, low);
+        let (timer, top) = ((*timer1).timer, u16::from_le_bytes([low, (*timer1).top_high]));
+        let (kind, size) = ((*timer).wgm_op_mode_kind, (*timer).wgm_op_mode_size);
+        let is_pwm = [simavr::avr_timer_wgm_pwm, simavr::avr_timer_wgm_fast_pwm].iter().any(|&pwm| pwm as i32 == kind);
+        if !has_clock(chip) || !is_pwm {
+            return;
+        }
+        let prescaler = u64::from((*timer).cs_div_value);
+        let since_bottom = (*avr).cycle.wrapping_sub((*timer).tov_base);
+        // simavr has no bottoms in a period of one cycle.
+        if (*timer).tov_cycles <= 1 || since_bottom >= prescaler * (u64::from(top) + 1) {
+            (*timer).tov_base = (*avr).cycle - since_bottom % prescaler;
+        }
+        // The running period keeps its compare value, and the next one has that of the register.
+        let [next_low, next_high] = [OCR1AL, OCR1AH].map(|register| chip.read(register));
+        let [running_low, running_high] = match (*timer1).running_compare_cycles {
+            cycles if cycles > 0 && (*timer1).is_buffered(chip) => {
+                ((cycles / prescaler) as u16).wrapping_sub(1).to_le_bytes()
+            }
+            _ => [next_low, next_high],
+        };
+        // simavr recalculates a running period when OCR1A is written in normal mode. There the mode's size is the top.
+        ((*timer).wgm_op_mode_kind, (*timer).wgm_op_mode_size) = (simavr::avr_timer_wgm_normal as i32, top.into());
+        let writer = (*timer1).compare_writer;
+        chip.set(OCR1AH, running_high);
+        writer.write(chip, OCR1AL, running_low);
+        ((*timer).wgm_op_mode_kind, (*timer).wgm_op_mode_size) = (kind, size);
+        chip.set(OCR1AH, next_high);
+        on_compare_write(avr, OCR1AL, next_low, timer1.cast());
     }
 }
 
