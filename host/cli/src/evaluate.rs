@@ -48,12 +48,16 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<()> {
     let folder = arguments.out.as_ref().map(|out| out.folder([REPORT], arguments.replace)).transpose()?;
     let mut records = evaluation::read_csv(&arguments.file)?;
+    if arguments.log.is_none() && records.iter().any(|record| record.plot == 0) {
+        tell!("The column plot does not number each plot once, so plots have the numbers of their lines.");
+    }
     let (analysis, joined) = match &arguments.log {
         Some(log) => {
             let levels_km_h = records.iter().map(|record| record.speed_km_h).collect();
             let stretches = worked(&logbook::log::read(log)?);
             let joined = field_log::join(&mut records, &stretches, &arguments.plots)?;
-            joined.iter().filter_map(OfLog::warning).for_each(|warning| tell!("{warning}"));
+            let warnings = joined.iter().flat_map(|of_log| [of_log.warning(), of_log.too_few_plants()]);
+            warnings.flatten().for_each(|warning| tell!("{warning}"));
             (Analysis::at_levels(records, levels_km_h), Some(joined))
         }
         None => (Analysis::at_speeds(records, &arguments.speeds), None),

@@ -125,12 +125,15 @@ impl Arguments {
         if self.synthetic {
             return synthetic::objects(self.crop, self.seed);
         }
-        let ToLearn { labelled, unlabelled, repeated } = table::read_labelled(&self.files)?;
+        let ToLearn { labelled, unlabelled, repeated, contradictions } = table::read_labelled(&self.files)?;
         if unlabelled > 0 {
             tell!("Passed over {unlabelled} without a label");
         }
         if repeated > 0 {
             tell!("Passed over {repeated} that repeat another line");
+        }
+        if let Some(first) = contradictions.first() {
+            tell!("Learned {} with both labels, such as {first}", contradictions.len());
         }
         Ok(labelled)
     }
@@ -177,6 +180,9 @@ fn beside(arguments: &Arguments, table: Option<&OutFile>, objects: &[Labelled]) 
         ),
     };
     write_if_asked(table, "Table", arguments.json, |to| Ok(listing::write_csv(&chosen, to)?))?;
+    if let Some(table) = table.filter(|_| chosen.is_empty()) {
+        tell!("{} has no example: none improves the built-in table", table.path().display());
+    }
     printed
 }
 

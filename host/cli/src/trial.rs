@@ -274,7 +274,6 @@ fn show(
 ) -> Result<Finding> {
     let &Shown { json, brief, .. } = shown;
     let totals = experiment::totals(outcomes);
-    let analysis = Analysis::of(experiment::records(outcomes, Treatment::Firmware))?;
     let summary = summary(&study.experiment, &totals);
     let printed = if json {
         say!("{:#}", json!({ "summary": summary, "plots": outcomes.iter().map(in_json).collect::<Vec<_>>() }))
@@ -288,6 +287,8 @@ fn show(
     let alarms: u32 = of(&totals, Treatment::Firmware).map(|total| total.plots.alarms).sum();
     let damaged: u32 = of(&totals, Treatment::Firmware).map(|total| total.plots.effect.injured_of_seen().0).sum();
     if let Some(folder) = folder {
+        // It may take much longer than the trial.
+        let analysis = Analysis::of(experiment::records(outcomes, Treatment::Firmware))?;
         write_report(folder, study, picture()?, outcomes, &totals, &analysis, summary)?;
         if !json {
             say!("\nWritten: report.html, trial.csv and controllers.csv in {}", folder.path().display())?;

@@ -11,6 +11,7 @@ use csv::StringRecord;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::sync::OnceLock;
 
 /// A table: some lines of text in columns.
 pub struct CsvTable {
@@ -18,8 +19,8 @@ pub struct CsvTable {
     separator: u8,
     header: StringRecord,
     lines: Vec<(u64, StringRecord)>,
-    /// Whether a comma of a number can only be a decimal one.
-    has_decimal_comma: bool,
+    /// See [`decimal`](Self::decimal).
+    decimal: OnceLock<Option<char>>,
 }
 
 /// What may separate the cells of a line, the usual one first.
@@ -39,31 +40,49 @@ impl CsvTable {
     /// # Errors
     /// As [`read`](Self::read), but a short line is none.
     pub fn read_with_gaps(path: &Path, columns: &[&str]) -> Result<Self, FileError> {
-        Self::parse_lines(path, bounded_file::bytes(path)?, columns, true)
+        Self::parse_lines(path, bounded_file::bytes(path)?, columns, true, 1)
+    }
+
+    /// Reads a file that may have only its header.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read), but a table without lines is none.
+    pub fn read_or_empty(path: &Path, columns: &[&str]) -> Result<Self, FileError> {
+        Self::parse_lines(path, bounded_file::bytes(path)?, columns, false, 0)
     }
 
     /// Parses a file's text. The table must have these columns and at least one line below its header.
     ///
-    /// A last line `ok` is ignored: the firmware's console ends its answers with it, and tables are pasted from there.
+    /// Lines `ok` are ignored: the firmware's console ends its answers with it, and tables are pasted from there.
     ///
     /// # Errors
     /// Names the file, the line and what would be right.
     pub fn parse(path: &Path, text: Vec<u8>, columns: &[&str]) -> Result<Self, FileError> {
-        Self::parse_lines(path, text, columns, false)
+        Self::parse_lines(path, text, columns, false, 1)
     }
 
-    /// As [`parse`](Self::parse). A line may end before the last column if `may_be_short`.
-    fn parse_lines(path: &Path, text: Vec<u8>, columns: &[&str], may_be_short: bool) -> Result<Self, FileError> {
+    /// As [`parse`](Self::parse), with `fewest` lines. A line may end before the last column if `may_be_short`.
+    fn parse_lines(
+        path: &Path,
+        text: Vec<u8>,
+        columns: &[&str],
+        may_be_short: bool,
+        fewest: usize,
+    ) -> Result<Self, FileError> {
         let at = |line: u64, problem: String| FileError::Line { path: path.into(), line, problem };
         let text = decoded(text).map_err(|(line, problem)| at(line, problem))?;
-        let text = text.trim_end();
-        let mut text = text.strip_suffix("\nok").unwrap_or(text).to_owned() + "\n";
+        let mut text = text.trim_end().to_owned() + "\n";
         let declared = declared_separator(&text);
         if declared.is_some() {
             // Its line stays, without text, so that lines are counted right.
             text.replace_range(..text.find('\n').unwrap_or_default(), "");
         }
         let separator = declared.unwrap_or_else(|| guessed_separator(&text, columns));
+        let first_cells = text.lines().map(|line| line.split(char::from(separator)).next().unwrap_or_default());
+        let mut first_cells = (1..).zip(first_cells.map(|cell| cell.trim_matches(['"', ' '])));
+        if let Some((line, cell)) = first_cells.find(|(_, cell)| is_failed_formula(cell)) {
+            return Err(at(line, format!("the formula of the first cell failed, `{cell}`: enter its value")));
+        }
 
         // The lengths of lines are looked at below.
         let mut builder = csv::ReaderBuilder::new();
@@ -82,7 +101,8 @@ impl CsvTable {
             before = line;
             // A spreadsheet quotes a note that has a comma.
             let is_note = record.get(0).is_some_and(|cell| cell.starts_with('#'));
-            if is_note || record.iter().all(str::is_empty) {
+            let is_end = record.get(0) == Some("ok") && record.iter().skip(1).all(str::is_empty);
+            if is_note || is_end || record.iter().all(str::is_empty) {
                 continue;
             }
             let Some((_, header)) = &header else {
@@ -106,17 +126,25 @@ impl CsvTable {
         let Some((header_line, header)) = header else {
             return Err(at(1, missing(columns.first().unwrap_or(&""), &StringRecord::new(), columns)));
         };
-        if lines.is_empty() {
+        if lines.len() < fewest {
             return Err(at(header_line, "no line is below the header: add at least one".to_owned()));
         }
-        let is_decimal = |cell: &str| with_point(cell) != cell && !may_be_thousands(cell);
-        let has_decimal_comma = separator != b',' && lines.iter().flat_map(|(_, line)| line).any(is_decimal);
-        Ok(Self { path: path.into(), separator, header, lines, has_decimal_comma })
+        Ok(Self { path: path.into(), separator, header, lines, decimal: OnceLock::new() })
     }
 
-    /// The lines below the header, at least one.
+    /// The lines below the header. At least one, unless the caller allows none.
     pub fn lines(&self) -> impl Iterator<Item = Line<'_>> {
         self.lines.iter().map(|(number, record)| Line { table: self, number: *number, record })
+    }
+
+    /// The mark that is certainly decimal in some number: comma or point. `None` if neither is, or both.
+    fn decimal(&self) -> Option<char> {
+        *self.decimal.get_or_init(|| {
+            let marks = self.lines.iter().flat_map(|(_, line)| line).filter_map(mark);
+            let mut decimal = marks.filter(|(_, may_be_thousands)| !may_be_thousands).map(|(mark, _)| mark);
+            let first = decimal.next()?;
+            decimal.all(|mark| mark == first).then_some(first)
+        })
     }
 }
 
@@ -201,8 +229,15 @@ fn missing(column: &str, header: &StringRecord, columns: &[&str]) -> String {
     }
 }
 
-/// The error for a field over several lines: it contains the lines after an open quotation mark.
-const UNCLOSED: &str = "a quotation mark is opened and not closed: a field ends on its own line";
+/// Whether a cell is a spreadsheet's answer to a formula that failed, such as `#REF!`. It begins no note.
+fn is_failed_formula(cell: &str) -> bool {
+    let is_shouted = || !cell.contains(|letter: char| letter.is_lowercase() || letter.is_whitespace());
+    let is_error = || ["#N/A", "#N/D", "#NV"].contains(&cell) || cell.ends_with(['!', '?']);
+    cell.starts_with('#') && is_error() && is_shouted() && cell.contains(char::is_uppercase)
+}
+
+/// The error for a field over several lines: it has a line break, or the lines after an open quotation mark.
+const UNCLOSED: &str = "a cell has a line break, or a quotation mark that is not closed: each cell stands on one line";
 
 /// The line after `before` on which this record opens a quotation mark that is not closed on the same line.
 fn opened(text: &str, before: u64, record: &StringRecord) -> Option<u64> {
@@ -232,21 +267,29 @@ impl Line<'_> {
     /// not separate the fields, a number may have a decimal comma.
     ///
     /// # Errors
-    /// If the text is none, or if its comma may be one of thousands, and no number of the table has another comma.
+    /// If the text is none. Also if its comma or point may be one of thousands, and no other number shows that it is
+    /// decimal. Where commas separate the fields, this holds for the point of a whole number only.
     pub fn value<T: FromStr>(&self, column: &str, right: &str) -> Result<T, FileError> {
         let text = self.text(column);
-        let point = if self.table.separator == b',' { text.into() } else { with_point(text) };
+        let commas_separate = self.table.separator == b',';
+        let point = if commas_separate { text.into() } else { with_point(text) };
         let whole =
             || point.split_once('.').filter(|(_, zeros)| zeros.bytes().all(|digit| digit == b'0'))?.0.parse().ok();
-        let is_unclear = may_be_thousands(text) && !self.table.has_decimal_comma;
-        let value = if is_unclear { None } else { point.parse().ok().or_else(whole) };
+        let unclear =
+            mark(text).filter(|(mark, may_be_thousands)| *may_be_thousands && self.table.decimal() != Some(*mark));
+        let value = match unclear {
+            None => point.parse().ok().or_else(whole),
+            Some(_) if commas_separate => point.parse().ok(),
+            Some(_) => None,
+        };
         value.ok_or_else(|| {
-            let hint = if is_unclear {
-                "; its comma may be one of thousands: write the number without it, or with a decimal point"
-            } else if self.table.separator == b',' && with_point(text) != text {
-                "; decimal commas need semicolons or tabs between the fields"
-            } else {
-                ""
+            let hint = match unclear {
+                Some((',', _)) => "; its comma may be one of thousands: leave it out, or write four decimals",
+                Some(_) => "; its point may be one of thousands: leave it out, or write four decimals",
+                None if commas_separate && with_point(text) != text => {
+                    "; decimal commas need semicolons or tabs between the fields"
+                }
+                None => "",
             };
             self.error(format!("{column} is `{text}`: it has to be {right}{hint}"))
         })
@@ -260,214 +303,18 @@ impl Line<'_> {
 
 /// A number with a decimal comma, with a point instead; other text as it is.
 fn with_point(text: &str) -> Cow<'_, str> {
-    let is_number = |(whole, decimals): (&str, &str)| {
-        let digits = whole.strip_prefix(['-', '+']).unwrap_or(whole);
-        let is_digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
-        is_digits(digits) && is_digits(decimals)
-    };
-    if text.split_once(',').is_some_and(is_number) { text.replace(',', ".").into() } else { text.into() }
+    if matches!(mark(text), Some((',', _))) { text.replace(',', ".").into() } else { text.into() }
 }
 
-/// Whether this may be an English number from 1,000 to 999,999, and is not certain to have decimals.
-fn may_be_thousands(text: &str) -> bool {
-    let digits = text.trim_start_matches(['-', '+']);
-    let groups = digits.split_once(',').map(|(thousands, rest)| (thousands.len(), rest.len()));
-    matches!(groups, Some((1..=3, 3))) && !digits.starts_with('0') && with_point(text) != text
+/// The comma or point of a number, and whether the number may be from 1,000 to 999,999 and have no decimals.
+fn mark(text: &str) -> Option<(char, bool)> {
+    let number = text.strip_prefix(['-', '+']).unwrap_or(text);
+    let (whole, rest) = number.split_once([',', '.'])?;
+    let is_digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    let may_be_thousands = whole.len() <= 3 && rest.len() == 3 && !whole.starts_with('0');
+    let mark = if number.contains(',') { ',' } else { '.' };
+    (is_digits(whole) && is_digits(rest)).then_some((mark, may_be_thousands))
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use std::fs;
-
-    /// The values of the column `place_mm` with their lines, or the error for a file with this text.
-    fn read(text: impl AsRef<[u8]>) -> Result<Vec<(u64, i16)>, String> {
-        let table = CsvTable::parse(Path::new("table.csv"), text.as_ref().to_owned(), &["place_mm"]);
-        let values = table.and_then(|table| {
-            table.lines().map(|line| Ok((line.number, line.value("place_mm", "a whole number")?))).collect()
-        });
-        values.map_err(|error: FileError| error.to_string())
-    }
-
-    #[test]
-    fn a_first_line_that_no_separator_follows_declares_none() {
-        for text in ["sep=\u{2028}", "sep=", "sep", "abcd\u{2028}x", ""] {
-            assert_eq!(declared_separator(text), None, "{text:?}");
-        }
-        assert_eq!(declared_separator("sep=;"), Some(b';'));
-    }
-
-    #[test]
-    fn lines_are_counted_alike_however_they_end() {
-        let text = "# measured in May\nplace_mm,width_mm\n\n7,1\n# a gap\n\n8,1\n";
-        for end in ["\n", "\r\n", "\r"] {
-            assert_eq!(read(text.replace('\n', end)), Ok(vec![(4, 7), (7, 8)]), "{end:?}");
-            let wrong = "table.csv, line 8: place_mm is `far`: it has to be a whole number";
-            assert_eq!(read(format!("{text}far,1").replace('\n', end)), Err(wrong.to_owned()), "{end:?}");
-            let short = "table.csv, line 8: fields: 1, where the header has 2: each line has one field a column";
-            assert_eq!(read(format!("{text}9").replace('\n', end)), Err(short.to_owned()), "{end:?}");
-        }
-    }
-
-    #[test]
-    fn a_wrong_table_is_refused_with_the_line_and_what_would_be_right() {
-        let missing = "the column `place_mm` is missing: the header has to name place_mm";
-        for (text, line, problem) in [
-            ("# measured in May\nwidth_mm\n7\n", 2, missing),
-            ("", 1, missing),
-            ("Place mm,width_mm\n7,1\n", 1, "the column `place_mm` is missing: did you mean place_mm by `Place mm`?"),
-            ("plase_mm;width_mm\n7;1\n", 1, "the column `place_mm` is missing: did you mean place_mm by `plase_mm`?"),
-            (
-                "place_mm,width_mm\n7,0,4\n",
-                2,
-                "fields: 3, where the header has 2: each line has one field a column; numbers with decimal commas need \
-                 semicolons or tabs between the fields, or a point",
-            ),
-            (
-                "place_mm,width_mm\n\"7,5\",1\n",
-                2,
-                "place_mm is `7,5`: it has to be a whole number; decimal commas need semicolons or tabs between the fields",
-            ),
-            (
-                "place_mm,width_mm,place_mm\n7,1,8\n",
-                1,
-                "the column `place_mm` occurs twice: each column needs its own name",
-            ),
-            ("place_mm,width_mm\n7,1\n# 5\" pot\n8,\"1\n9,1\n", 4, UNCLOSED),
-            ("place_mm,width_mm\n7,1\n\n8,\"1\n9,1\n10,1\n\"11,1", 4, UNCLOSED),
-            ("\"place_mm,width_mm\n7,1\n", 1, UNCLOSED),
-            ("place_mm,\"width_mm\n7,1\n", 1, UNCLOSED),
-        ] {
-            assert_eq!(read(text), Err(format!("table.csv, line {line}: {problem}")), "{text:?}");
-        }
-        for text in [
-            "place_mm,x\n7,a\n8,Stra\u{df}e\n",
-            "place_mm,x\r\n7,a\r\n8,Stra\u{df}e\r\n",
-            "place_mm,x\r7,a\r8,Stra\u{df}e\r",
-        ] {
-            let latin: Vec<u8> = text.chars().map(|letter| u32::from(letter) as u8).collect();
-            let error = read(latin).unwrap_err();
-            assert!(error.starts_with("table.csv, line 3: the byte 0xDF is not UTF-8"), "{error}");
-            let wide = |mark: &[u8], bytes: fn(u16) -> [u8; 2]| {
-                [mark, &text.encode_utf16().flat_map(bytes).collect::<Vec<_>>()].concat()
-            };
-            for wide in
-                [wide(b"\xFF\xFE", u16::to_le_bytes), wide(b"\xFE\xFF", u16::to_be_bytes), wide(b"", u16::to_le_bytes)]
-            {
-                let error = read(wide).unwrap_err();
-                assert_eq!(error, "table.csv, line 1: the file is saved as UTF-16: save it as CSV in UTF-8");
-            }
-        }
-        assert_eq!(read("place_mm,width_mm,width_mm\n7,1,8\n"), Ok(vec![(2, 7)]), "it is not read");
-        assert_eq!(read("place_mm,pot\n7,\"5\"\", clay\"\n8,5\" clay\n"), Ok(vec![(2, 7), (3, 8)]));
-    }
-
-    #[test]
-    fn a_comma_that_may_be_one_of_thousands_is_refused_unless_another_number_shows_what_it_is() {
-        let read = |text: &str| {
-            let table = CsvTable::parse(Path::new("table.csv"), text.into(), &["place_mm"]).unwrap();
-            let places = table.lines().map(|line| line.value::<f64>("place_mm", "a number"));
-            let counts = table.lines().map(|line| line.value::<u16>("count", "a whole number"));
-            let values = places.zip(counts).map(|(place, count)| Ok((place?, count?)));
-            values.collect::<Result<Vec<_>, FileError>>().map_err(|error| error.to_string())
-        };
-        for (text, values) in [
-            ("place_mm;count\n12,125;1,000\n0,125;2", vec![(12.125, 1), (0.125, 2)]),
-            ("place_mm;count\n12,125;1,000\n750;2,0", vec![(12.125, 1), (750.0, 2)]),
-            ("place_mm\tcount\n-1200,5\t12,0", vec![(-1200.5, 12)]),
-            ("place_mm\tcount\n1.200\t1000", vec![(1.2, 1000)]),
-        ] {
-            assert_eq!(read(text), Ok(values), "{text:?}");
-        }
-        for (text, wrong) in [
-            ("place_mm\tcount\n750\t1\n1,250\t2", "line 3: place_mm is `1,250`: it has to be a number; its comma"),
-            ("place_mm;count\n0.5;1,000", "line 2: count is `1,000`: it has to be a whole number; its comma may be"),
-            ("place_mm,count\n\"-1,250\",1", "; its comma may be one of thousands: write the number without it"),
-        ] {
-            let error = read(text).unwrap_err();
-            assert!(error.contains(wrong), "{error}");
-        }
-    }
-
-    #[test]
-    fn the_console_s_ok_at_the_end_is_no_line_of_the_table() {
-        for end in ["ok", "ok\n", "ok\n\n"] {
-            for between in ["\n", "\r\n"] {
-                let text = format!("place_mm,width_mm\n7,1\n{end}").replace('\n', between);
-                assert_eq!(read(&text), Ok(vec![(2, 7)]), "{text:?}");
-            }
-        }
-        assert!(read("place_mm,width_mm\nok\n7,1\n").unwrap_err().starts_with("table.csv, line 2: fields: 1"));
-        assert!(read("place_mm,width_mm\nok\n").unwrap_err().starts_with("table.csv, line 1: no line is below"));
-    }
-
-    /// A table as a spreadsheet may save it: the habits are bits of `habits`.
-    fn saved(habits: u32) -> Vec<u8> {
-        let has = |habit: u32| habits & (1 << habit) != 0;
-        let separator = [",", ";", "\t", ";"][habits as usize & 3];
-        let point = if separator == "," { "." } else { "," };
-        let width = if has(2) { 6 } else { 3 };
-        let blank = separator.repeat(width - 1);
-        // Excel looks at the first 16 rows, and pads no further than these need.
-        let row = |number: usize, cells: &[&str]| {
-            let padded = if has(3) && number > 16 { 3 } else { width };
-            cells.join(separator) + &separator.repeat(padded - 3)
-        };
-        let mut lines = Vec::new();
-        if has(4) {
-            lines.push(format!("sep={separator}{}", separator.repeat(if separator == "," { 0 } else { 2 })));
-        }
-        if has(5) {
-            lines.push(format!("\"# counted \"\"here\"\"{separator} and there\"{}", separator.repeat(2)));
-        }
-        if has(6) {
-            lines.push(blank.clone());
-        }
-        lines.push(row(0, &["place_mm", "width_mm", "kind"]));
-        for number in 1..=20 {
-            let decimals = if has(7) { format!("{point}0") } else { String::new() };
-            let quote = if has(8) { "\"" } else { "" };
-            let (whole, decimal) = (format!("{number}{decimals}"), format!("{number}{point}25"));
-            let [whole, decimal] = [whole, decimal].map(|cell| format!("{quote}{cell}{quote}"));
-            lines.push(row(number, &[&whole, &decimal, "plant"]));
-            if has(9) && number % 7 == 0 {
-                lines.push(blank.clone());
-            }
-        }
-        if has(6) {
-            lines.extend(vec![blank; 3]);
-        }
-        let text = lines.join(if has(10) { "\r\n" } else { "\n" });
-        let mark = if has(11) { "\u{feff}" } else { "" };
-        format!("{mark}{text}{}", if has(12) { "\n" } else { "" }).into_bytes()
-    }
-
-    #[test]
-    fn every_mixture_of_a_spreadsheet_s_habits_gives_the_same_table() {
-        // A fifth of all mixtures: each two habits meet with and without each other.
-        for habits in (0..1 << 13).step_by(5) {
-            let text = saved(habits);
-            let shown = String::from_utf8_lossy(&text).into_owned();
-            let table = CsvTable::parse(Path::new("table.csv"), text, &["place_mm", "width_mm", "kind"]);
-            let table = table.unwrap_or_else(|error| panic!("{error}\n{shown}"));
-            let values = table.lines().map(|line| {
-                let place: i16 = line.value("place_mm", "a whole number")?;
-                Ok((place, line.value::<f64>("width_mm", "a number")?, line.text("kind").to_owned()))
-            });
-            let values: Vec<_> =
-                values.collect::<Result<_, FileError>>().unwrap_or_else(|error| panic!("{error}\n{shown}"));
-            let expected: Vec<_> = (1..=20).map(|place| (place, f64::from(place) + 0.25, "plant".to_owned())).collect();
-            assert_eq!(values, expected, "{shown}");
-        }
-    }
-
-    #[test]
-    fn a_short_line_is_filled_only_where_cells_may_be_empty() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("table.csv");
-        fs::write(&path, "place_mm,width_mm\n7\n").unwrap();
-        assert!(CsvTable::read(&path, &["place_mm"]).is_err());
-        let table = CsvTable::read_with_gaps(&path, &["place_mm"]).unwrap();
-        assert_eq!(table.lines().map(|line| line.text("width_mm").to_owned()).collect::<Vec<_>>(), [""]);
-    }
-}
+mod tests;

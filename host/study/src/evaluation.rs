@@ -91,10 +91,8 @@ impl Analysis {
     /// # Errors
     /// As [`of`](Self::of), and if a plot is far from each nominal speed.
     pub fn at_speeds(mut records: Vec<PlotRecord>, nominal_km_h: &[f64]) -> Result<Self> {
-        for (record, number) in records.iter_mut().zip(1..) {
-            if record.plot == 0 {
-                record.plot = number;
-            }
+        if records.iter().any(|record| record.plot == 0) {
+            (1..).zip(&mut records).for_each(|(number, record)| record.plot = number);
         }
         let levels_km_h = match nominal_km_h {
             [] => records.iter().map(|record| record.speed_km_h).collect(),

@@ -235,7 +235,7 @@ fn a_plot_without_a_count_takes_part_in_what_it_has() {
 #[test]
 fn a_plot_without_weeds_or_plants_takes_part_in_the_rest() {
     let mut plots = example();
-    (plots[2].weeds_before, plots[2].weeds_after) = (Some(0), Some(0));
+    (plots[2].weeds_before, plots[2].weeds_after) = (Some(0), Some(5));
     (plots[6].plants, plots[6].damaged) = (Some(0), Some(0));
     let analysis = Analysis::of(plots).unwrap();
     assert_eq!(analysis.responses.iter().map(|of| of.plots.len()).collect::<Vec<_>>(), [23, 23, 22, 24]);
@@ -244,6 +244,7 @@ fn a_plot_without_weeds_or_plants_takes_part_in_the_rest() {
         "Plot 3 (no weed before weeding) takes no part in weeding efficiency and performance index.",
     );
     assert_found(&analysis, "Plot 7 (no plant) takes no part in plant damage and performance index.");
+    assert!(!analysis.findings().iter().any(|finding| finding.contains("more weeds")), "{:#?}", analysis.findings());
     let none = example().into_iter().map(|plot| PlotRecord { weeds_after: None, ..plot });
     let analysis = Analysis::of(none.collect()).unwrap();
     assert_eq!(analysis.responses[1].model, Err(NoModel::NotMeasured));

@@ -46,6 +46,16 @@ fn examples_written_as_csv_are_known_to_the_firmware() {
 }
 
 #[test]
+fn a_table_of_no_examples_says_why() {
+    let folder = TempDir::new().unwrap();
+    let output = weeder(folder.path(), &["train", "--synthetic", "--beside", "--out", "none.csv"]);
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{message}");
+    assert!(message.contains("none.csv has no example: none improves the built-in table"), "{message}");
+    assert_eq!(fs::read_to_string(folder.path().join("none.csv")).unwrap(), HEADER);
+}
+
+#[test]
 fn a_plant_that_would_be_cut_ends_with_status_1() {
     // A plant as narrow as a weed.
     let folder = folder_with("694,300,226,116,439,plant\n694,500,226,250,573,plant\n");
@@ -81,7 +91,7 @@ fn a_table_larger_than_the_flash_budget_is_refused_by_name() {
     let above = MOST_EXAMPLES + 1;
     let room = format!("it has to be a whole number from 0 to {MOST_EXAMPLES}");
     assert_not_taken("", &["train", "--synthetic", "--max", &above.to_string()], &room);
-    assert_not_taken("", &["train", "--synthetic", "--max", "9"], "too many examples for the flash budget");
+    assert_not_taken("", &["train", "--synthetic", "--max", "9"], "too many examples: ");
 }
 
 #[test]
@@ -94,14 +104,10 @@ fn objects_that_take_more_examples_than_the_flash_has_room_for_are_refused_by_na
         (0..4).map(line).collect::<String>()
     };
     let chessboard: String = (0..400).map(square).collect();
-    for most in ["64".to_owned(), MOST_EXAMPLES.to_string()] {
-        let room = format!("and there is room for {most}: remove detections with a wrong label");
-        assert_not_taken(
-            &chessboard,
-            &["train", "objects.csv", "--max", &most],
-            "too many examples for the flash budget",
-        );
-        assert_not_taken(&chessboard, &["train", "objects.csv", "--max", &most], &room);
+    for (most, other) in [(64, ", or choose a larger --max"), (MOST_EXAMPLES, "\n")] {
+        let room =
+            format!("there is room for {most}: remove detections with a wrong label, or unlike all others{other}");
+        assert_not_taken(&chessboard, &["train", "objects.csv", "--max", &most.to_string()], &room);
     }
 }
 
@@ -117,7 +123,13 @@ fn detections_that_dumps_repeat_count_once() {
     let output = weeder(folder.path(), &["train", "objects.csv"]);
     let [said, told] = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text).into_owned());
     assert!(said.starts_with("Detections  8\n"), "{said}");
-    assert!(told.contains("Passed over 16 that repeat another line"), "{told}");
+    assert!(told.contains("Passed over 16 that repeat another line") && !told.contains("both labels"), "{told}");
+    fs::write(folder.path().join("relabelled.csv"), HEADER.to_owned() + &detection(2).replace("plant", "weed"))
+        .unwrap();
+    let output = weeder(folder.path(), &["train", "objects.csv", "relabelled.csv"]);
+    let told = String::from_utf8_lossy(&output.stderr);
+    let said = "Learned 1 with both labels, such as relabelled.csv, line 2: an earlier line has it as a plant";
+    assert!(told.contains(said), "{told}");
 }
 
 #[test]

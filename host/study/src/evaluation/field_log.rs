@@ -5,7 +5,7 @@
 
 use super::PlotRecord;
 use crate::table::{Table, fixed, optional, short};
-use anyhow::{Result, anyhow, ensure};
+use anyhow::{Result, anyhow, bail, ensure};
 use logbook::worked::Worked;
 use serde::Serialize;
 
@@ -19,7 +19,7 @@ pub struct OfLog {
     pub plot: u32,
     /// The first line of its first stretch, and the last line of its last one.
     pub lines: (u64, u64),
-    /// From its first stretch's start to its last one's end, in s.
+    /// From start to end of its stretches, in s. A pause counts, if no other stretch lies between.
     pub time_s: f64,
     /// Net distance by the wheel, m. `None` if a part of it is unknown.
     pub distance_m: Option<f64>,
@@ -29,23 +29,31 @@ pub struct OfLog {
     pub planned_km_h: f64,
     /// Plants that the tool passed.
     pub plants: Option<u32>,
+    /// Damaged plants in the table, if it has no number of plants.
+    #[serde(skip)]
+    pub damaged: Option<u32>,
     /// Swings out of the row.
     pub swings: u32,
 }
 
 impl OfLog {
-    fn of(record: &PlotRecord, stretches: &[&Worked]) -> Self {
+    /// `parts` are the plot's stretches, those without another one between together.
+    fn of(record: &PlotRecord, parts: &[&[(u32, &Worked)]]) -> Self {
+        let stretches: Vec<&Worked> = parts.iter().copied().flatten().map(|(_, worked)| *worked).collect();
         let (first, last) = (&stretches[0], &stretches[stretches.len() - 1]);
+        let time_ms =
+            |part: &&[(u32, &Worked)]| part[part.len() - 1].1.time_ms.end.saturating_sub(part[0].1.time_ms.start);
         let distance_m = stretches.iter().map(|worked| worked.distance_mm).sum::<Option<f64>>().map(|mm| mm / 1000.0);
         let rolled_h = stretches.iter().map(|worked| worked.rolled_ms).sum::<u64>() as f64 / 3.6e6;
         Self {
             plot: record.plot,
             lines: (first.lines.start, last.lines.end - 1),
-            time_s: last.time_ms.end.saturating_sub(first.time_ms.start) as f64 / 1000.0,
+            time_s: parts.iter().map(time_ms).sum::<u64>() as f64 / 1000.0,
             distance_m,
             speed_km_h: distance_m.filter(|m| rolled_h > 0.0 && *m > 0.0).map(|m| m / 1000.0 / rolled_h),
             planned_km_h: record.speed_km_h,
             plants: stretches.iter().map(|worked| worked.plants).sum(),
+            damaged: record.damaged.filter(|_| record.plants.is_none()),
             swings: stretches.iter().map(|worked| worked.swings).sum(),
         }
     }
@@ -61,6 +69,12 @@ impl OfLog {
             )
         })
     }
+
+    /// Says that the log has fewer plants than are damaged. The table does not get their number.
+    pub fn too_few_plants(&self) -> Option<String> {
+        let (plants, damaged) = self.plants.zip(self.damaged).filter(|(plants, damaged)| plants < damaged)?;
+        Some(format!("plot {}: plants in the log: {plants}, damaged: {damaged}: count the plants yourself", self.plot))
+    }
 }
 
 /// Joins the plots with the stretches of work in a log. `plots` has the plot of each stretch, and 0 for none. It may be
@@ -68,8 +82,14 @@ impl OfLog {
 /// log.
 ///
 /// # Errors
-/// If the numbers do not match, with the stretches; or a plot is not in the table.
+/// If the numbers do not match, with the stretches; a plot has no number of its own, or is not in the table.
 pub fn join(records: &mut [PlotRecord], stretches: &[Worked], plots: &[u32]) -> Result<Vec<OfLog>> {
+    if let Some(PlotRecord { replication, speed_km_h, spacing_cm, .. }) = records.iter().find(|of| of.plot == 0) {
+        bail!(
+            "replication {replication} of {speed_km_h} km/h and {spacing_cm} cm has no number of its own: \
+             the column plot has to number each plot once, from 1, or be empty"
+        );
+    }
     let mut numbers: Vec<u32> = records.iter().map(|record| record.plot).collect();
     numbers.sort_unstable();
     let plots = if plots.is_empty() { &numbers } else { plots };
@@ -84,19 +104,20 @@ pub fn join(records: &mut [PlotRecord], stretches: &[Worked], plots: &[u32]) -> 
     if let Some(unknown) = plots.iter().find(|&&plot| plot > 0 && !numbers.contains(&plot)) {
         return Err(anyhow!("plot {unknown} is not in the table, which has {} plots", records.len()));
     }
+    let stretches: Vec<(u32, &Worked)> = plots.iter().copied().zip(stretches).collect();
     let mut joined = Vec::new();
     for record in records {
-        let of_plot = plots.iter().zip(stretches).filter(|&(plot, _)| *plot == record.plot);
-        let of_plot: Vec<&Worked> = of_plot.map(|(_, worked)| worked).collect();
-        if of_plot.is_empty() {
+        let parts = stretches.chunk_by(|(one, _), (next, _)| one == next);
+        let parts: Vec<_> = parts.filter(|part| part[0].0 == record.plot).collect();
+        if parts.is_empty() {
             continue;
         }
-        let of_log = OfLog::of(record, &of_plot);
+        let of_log = OfLog::of(record, &parts);
         let m2 = |width_m: f64| of_log.distance_m.map(|m| m * width_m).filter(|m2| *m2 > 0.0);
         // More digits would only seem to be measured.
         record.speed_km_h = of_log.speed_km_h.map_or(record.speed_km_h, |km_h| (km_h * 1000.0).round() / 1000.0);
         record.time_s = record.time_s.or(Some(of_log.time_s).filter(|time_s| *time_s > 0.0));
-        record.plants = record.plants.or(of_log.plants);
+        record.plants = record.plants.or(of_log.plants.filter(|_| of_log.too_few_plants().is_none()));
         record.area_m2 = record.area_m2.or_else(|| m2(record.width_m?));
         joined.push(of_log);
     }
@@ -176,8 +197,27 @@ mod tests {
         // With the pause between the two parts.
         assert_eq!((joined[0].time_s, joined[0].distance_m), (70.0, Some(30.0)));
         assert!((records[0].speed_km_h - 1.8).abs() < 1e-9);
+        let joined = join(&mut records, &stretches, &[1, 2, 1, 0]).expect("they match");
+        assert_eq!((joined[0].time_s, joined[0].distance_m), (32.0, Some(15.5)), "without the other plot between");
         let error = join(&mut records, &stretches, &[0, 1, 3, 2]).expect_err("there is no plot 3").to_string();
         assert_eq!(error, "plot 3 is not in the table, which has 2 plots");
+        let error = join(&mut [plot(1, 1.8), plot(0, 2.5)], &stretches[..2], &[]).expect_err("one has no number");
+        assert!(
+            error.to_string().starts_with("replication 1 of 2.5 km/h and 50 cm has no number of its own:"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn fewer_plants_in_the_log_than_damaged_ones_are_told_and_not_taken() {
+        // The log has 60 plants.
+        for (damaged, counted, taken, is_told) in
+            [(61, None, None, true), (60, None, Some(60), false), (61, Some(65), Some(65), false)]
+        {
+            let mut records = [PlotRecord { damaged: Some(damaged), plants: counted, ..plot(1, 1.8) }];
+            let joined = join(&mut records, &[stretch(0, 60, 30.0)], &[]).expect("they match");
+            assert_eq!((records[0].plants, joined[0].too_few_plants().is_some()), (taken, is_told));
+        }
     }
 
     #[test]

@@ -55,9 +55,10 @@ impl Analysis {
         reasons.into_iter().map(sentence).collect()
     }
 
-    /// The plots with more weeds after weeding than before.
+    /// The plots with more weeds after weeding than before. Without any before, a plot has no efficiency.
     fn more_weeds(&self) -> Option<String> {
-        let plots = self.named(|record| record.weeds_before.is_some_and(|before| record.weeds_after > Some(before)))?;
+        let plots =
+            self.named(|of| of.weeds_before.is_some_and(|before| before > 0 && of.weeds_after > Some(before)))?;
         Some(format!(
             "{plots}: more weeds were counted after weeding than before. The weeding efficiency is negative there; in the binomial model no weed counts as gone. If this is a mistake, correct it; {LEAVE_OUT}."
         ))

@@ -14,7 +14,7 @@ const S_PER_H: f64 = 3600.0;
 /// The counts and measurements of one plot. What was not counted or measured is `None`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PlotRecord {
-    /// Its number in the field, from 1; 0 if it has none yet.
+    /// Its number in the field, from 1; 0 if it has none of its own.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub plot: u32,
     /// The number of its replication.

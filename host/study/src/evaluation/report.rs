@@ -5,7 +5,7 @@ use super::plot::COLUMNS;
 use super::published::Published;
 use super::{Analysis, Performance, ResponseAnalysis};
 use crate::statistics::{AnalysisOfVariance, BinomialModel, LinearModel};
-use crate::table::{NOTHING, Table, fixed, optional, probability, short, significant};
+use crate::table::{NOTHING, Table, fixed, optional, probability, short, significant, visible};
 use std::fmt::{self, Display, Formatter};
 
 /// The meaning of p-values and index.
@@ -230,10 +230,17 @@ impl AnalysisOfVariance {
     }
 }
 
-/// A factor of the odds. A close pair of speeds can give one of hundreds of digits.
+/// A factor of the odds. A close pair of speeds can give one of hundreds of digits. It never reads as 0.
 pub(super) fn times(odds: f64, decimals: usize) -> String {
+    const LEAST: f64 = 1e-6;
     const MOST: f64 = 1e6;
-    if odds > MOST { format!("> {MOST}") } else { fixed(odds, decimals) }
+    if odds < LEAST {
+        format!("< {LEAST}")
+    } else if odds > MOST {
+        format!("> {MOST}")
+    } else {
+        visible(odds, decimals)
+    }
 }
 
 /// Words with a capital letter in front and a full stop behind.

@@ -5,7 +5,7 @@
 
 use super::plot::{COLUMNS, PlotRecord, whole};
 use files::FileError;
-use files::csv_table::CsvTable;
+use files::csv_table::{CsvTable, Line};
 use std::collections::HashSet;
 use std::path::Path;
 
@@ -43,12 +43,13 @@ pub fn read_csv(path: &Path) -> Result<Vec<PlotRecord>, FileError> {
     Ok(plots.into_iter().map(|(_, plot)| plot).collect())
 }
 
-/// The number of each line's plot: by the column `plot` if it numbers all plots, else by the line.
+/// The number of each line's plot: by the column `plot`, or by the line if that column is empty. A plot that has no
+/// number of its own in the column has 0.
 fn numbers(table: &CsvTable) -> Vec<u32> {
-    let numbered: Option<Vec<u32>> =
-        table.lines().map(|line| whole(line, "plot").ok().filter(|number| *number > 0)).collect();
-    let is_each_once = |numbers: &Vec<u32>| numbers.iter().collect::<HashSet<_>>().len() == numbers.len();
-    numbered.filter(is_each_once).unwrap_or_else(|| (1..).zip(table.lines()).map(|(number, _)| number).collect())
+    let is_numbered = table.lines().any(|line| !line.text("plot").is_empty());
+    let mut seen = HashSet::from([0]);
+    let mut own = |line: Line| whole(line, "plot").ok().filter(|number| seen.insert(*number)).unwrap_or_default();
+    (1..).zip(table.lines()).map(|(number, line)| if is_numbered { own(line) } else { number }).collect()
 }
 
 #[cfg(test)]
@@ -74,6 +75,19 @@ mod tests {
         let values: Vec<&str> = LINE.trim().split(',').rev().collect();
         let text = format!("\u{feff}# a plot\n{},engine\n{},native\n", columns.join(","), values.join(","));
         assert_eq!(read(&text), read(&format!("{HEADER}{LINE}")));
+    }
+
+    #[test]
+    fn a_plot_without_a_number_of_its_own_has_none() {
+        let numbers = |plots: [&str; 4]| {
+            let line = |(replication, plot): (u32, &str)| format!("{plot},{replication}{}", &LINE[1..]);
+            let lines: String = (1..).zip(plots).map(line).collect();
+            read(&format!("plot,{HEADER}{lines}")).unwrap().iter().map(|record| record.plot).collect::<Vec<_>>()
+        };
+        assert_eq!(numbers(["3", "1", "4", "2.0"]), [3, 1, 4, 2]);
+        assert_eq!(numbers(["3", "1", "3", "P7"]), [3, 1, 0, 0]);
+        assert_eq!(numbers(["0", "1", "", "2"]), [0, 1, 0, 2]);
+        assert_eq!(numbers([""; 4]), [1, 2, 3, 4]);
     }
 
     /// The error for a plot with this text in a column.

@@ -65,6 +65,12 @@ fn a_small_share_of_damaged_plants_does_not_read_as_0() {
 }
 
 #[test]
+fn a_factor_of_the_odds_does_not_read_as_0() {
+    let shown = [1e-9, 0.000_002_17, 0.004, 4.488, 1e7].map(|odds| report::times(odds, 2));
+    assert_eq!(shown, ["< 0.000001", "0.0000022", "0.0040", "4.49", "> 1000000"]);
+}
+
+#[test]
 fn only_slopes_by_speed_that_the_trial_has_are_compared_with_the_paper_s() {
     // Damage and weeding scatter around the paper's slopes, at these speeds.
     let trial = |speeds_km_h: &[f64], damaged: &[u32]| {

@@ -56,7 +56,7 @@ impl Checks {
         }
         if let Some(p) = found(self.unequal_scatter_p) {
             said.push(format!(
-                "{name} scatters more at some speeds or spacings than at others ({p}): its p-values are too small."
+                "{name} scatters more at some speeds or spacings than at others ({p}): its p-values are not exact."
             ));
         }
         if let Some((farthest, p)) = &self.farthest

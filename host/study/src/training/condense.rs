@@ -13,6 +13,7 @@
 //!
 //! Among equals the first in the list is chosen.
 
+use super::MOST_EXAMPLES;
 use super::model::{answer_of_others, class_of};
 use anyhow::{Result, ensure};
 use control::ground::{
@@ -22,11 +23,11 @@ use control::ground::{
 use knn::{Example, Kind, classify, squared_distance};
 use std::collections::HashSet;
 
-/// Checks that there is room for this number of examples.
-fn check_room(needed: usize, most: usize) -> Result<()> {
+/// Checks that there is room for this number of examples. `other` is another way out.
+fn check_room(needed: usize, most: usize, other: &str) -> Result<()> {
     ensure!(
         needed <= most,
-        "too many examples for the flash budget: these detections need {needed} examples, and there is room for {most}: remove detections with a wrong label, or unlike all others"
+        "too many examples: these detections need {needed}, and there is room for {most}: remove detections with a wrong label, or unlike all others{other}"
     );
     Ok(())
 }
@@ -60,6 +61,7 @@ pub fn edit(examples: &[Example<COUNT>]) -> Vec<usize> {
 /// If more are needed.
 pub fn condense(examples: &[Example<COUNT>], edited: &[usize], k: u8, radius: u32, most: usize) -> Result<Vec<usize>> {
     let half = radius / 2;
+    let other = if most < MOST_EXAMPLES { ", or choose a larger --max" } else { "" };
     let is_mistreated = |index: usize, kept: &[Example<COUNT>]| {
         let is_weed = examples[index].label == label::WEED;
         let reach = if is_weed { half } else { radius };
@@ -68,7 +70,7 @@ pub fn condense(examples: &[Example<COUNT>], edited: &[usize], k: u8, radius: u3
     };
     let mut kept = Vec::new();
     keep_most_needed(examples, edited, &mut kept, usize::MAX, half, is_mistreated);
-    check_room(kept.len().max(usize::from(k)), most)?;
+    check_room(kept.len().max(usize::from(k)), most, other)?;
     let is_stranger = |index: usize, kept: &[Example<COUNT>]| {
         kept.iter().all(|example| !are_fellows(example, &examples[index], radius))
     };
@@ -77,7 +79,7 @@ pub fn condense(examples: &[Example<COUNT>], edited: &[usize], k: u8, radius: u3
     kept.extend(others.iter().take(usize::from(k).saturating_sub(kept.len())));
     // A plant that is no longer a stranger can be outvoted by the weeds around it, and so can a weed.
     keep_most_needed(examples, edited, &mut kept, usize::MAX, half, is_mistreated);
-    check_room(kept.len().max(usize::from(k)), most)?;
+    check_room(kept.len().max(usize::from(k)), most, other)?;
     Ok(kept)
 }
 
@@ -116,7 +118,7 @@ pub fn beside(
         !is_taken_for_a_weed(index, kept) && costs_no_plant(index, kept)
     });
     let chosen: Vec<usize> = kept.drain(given.len()..).map(|index| index - given.len()).collect();
-    check_room(chosen.len(), most)?;
+    check_room(chosen.len(), most, "")?;
     Ok(chosen)
 }
 

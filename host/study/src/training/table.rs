@@ -1,18 +1,18 @@
 //! Reads and writes tables of detections as CSV, as the console and its users write them.
 //!
 //! The header names the five features and `label`, in any order. Other columns are ignored. So are lines that begin
-//! with `#`, and the `ok` that ends the console's answer. All features are whole numbers. A label is `plant`, `weed`,
-//! or empty for an unlabelled detection.
+//! with `#`, an `ok` that ends the console's answer, and the headers of further dumps. All features are whole numbers.
+//! A label is `plant`, `weed`, or empty for an unlabelled detection.
 //!
 //! The console's `dump` takes nothing away, so dumps overlap. A detection that is saved twice would make its own
 //! neighbour, and leaving one out would test nothing. So [`read_labelled`] reads equal lines once.
 
-use super::{Labelled, label_of};
+use super::Labelled;
 use control::ground::features::Features;
 use field::row::Kind;
 use files::FileError;
 use files::csv_table::{CsvTable, Line};
-use std::collections::HashSet;
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 /// The columns of the features, in the order of [`Features::values`].
@@ -38,7 +38,15 @@ pub struct Recorded {
 /// # Errors
 /// Names the file, the line and what would be right.
 pub fn read(path: &Path) -> Result<Vec<Recorded>, FileError> {
-    CsvTable::read(path, &COLUMNS)?.lines().map(object).collect()
+    detections(&CsvTable::read(path, &COLUMNS)?).map(object).collect()
+}
+
+/// Reads detections as [`read`], or none.
+///
+/// # Errors
+/// As [`read`], but a table without lines is none.
+pub fn read_or_empty(path: &Path) -> Result<Vec<Recorded>, FileError> {
+    detections(&CsvTable::read_or_empty(path, &COLUMNS)?).map(object).collect()
 }
 
 /// Detections to learn from, and what was passed over.
@@ -50,6 +58,8 @@ pub struct ToLearn {
     pub unlabelled: usize,
     /// Number of lines that repeat an earlier one: features, label, and place if the table has it.
     pub repeated: usize,
+    /// An error for each detection that has another label in an earlier line.
+    pub contradictions: Vec<String>,
 }
 
 /// Reads detections of both classes from files that together make one table.
@@ -59,23 +69,25 @@ pub struct ToLearn {
 pub fn read_labelled(paths: &[PathBuf]) -> Result<ToLearn, FileError> {
     let columns: Vec<&str> = COLUMNS.into_iter().chain([LABEL]).collect();
     let tables = paths.iter().map(|path| CsvTable::read(path, &columns)).collect::<Result<Vec<_>, _>>()?;
-    let (mut read, mut seen, mut last) = (ToLearn::default(), HashSet::new(), None);
-    for line in tables.iter().flat_map(CsvTable::lines) {
-        let Recorded { features, kind } = object(line)?;
-        match kind {
-            None => read.unlabelled += 1,
-            Some(kind)
-                if seen.insert((
-                    *features.values(),
-                    label_of(kind),
-                    PLACE.map(|column| line.text(column).to_owned()),
-                )) =>
-            {
-                read.labelled.push(Labelled { features, kind });
-            }
-            Some(_) => read.repeated += 1,
-        }
+    let (mut read, mut seen, mut last) = (ToLearn::default(), HashMap::new(), None);
+    for line in tables.iter().flat_map(detections) {
         last = Some(line);
+        let Recorded { features, kind } = object(line)?;
+        let Some(kind) = kind else {
+            read.unlabelled += 1;
+            continue;
+        };
+        let place = PLACE.map(|column| line.text(column).to_owned());
+        let labels: &mut Vec<Kind> = seen.entry((*features.values(), place)).or_default();
+        if labels.contains(&kind) {
+            read.repeated += 1;
+            continue;
+        }
+        if let Some(other) = labels.first() {
+            read.contradictions.push(line.error(format!("an earlier line has it as a {other}")).to_string());
+        }
+        labels.push(kind);
+        read.labelled.push(Labelled { features, kind });
     }
     let has = |kind: Kind| read.labelled.iter().any(|object: &Labelled| object.kind == kind);
     let missing = [Kind::Plant, Kind::Weed].into_iter().find(|&kind| !has(kind));
@@ -86,6 +98,11 @@ pub fn read_labelled(paths: &[PathBuf]) -> Result<ToLearn, FileError> {
         }
         _ => Ok(read),
     }
+}
+
+/// The lines of a table, without the headers of further dumps.
+fn detections(table: &CsvTable) -> impl Iterator<Item = Line<'_>> {
+    table.lines().filter(|line| line.text(COLUMNS[0]) != COLUMNS[0])
 }
 
 /// The object in a line.
