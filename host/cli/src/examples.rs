@@ -133,9 +133,9 @@ fn on_machine(port: &Port) -> Result<Vec<Taught>> {
     Ok(examples::read(&mut port.open()?)?.into_iter().map(|(_, example)| example).collect())
 }
 
-/// A table's examples, each once; at least one. Fails if it is no such table.
+/// A table's examples, each once. Only a table without lines has none. Fails if it is no such table.
 pub fn in_table(file: &Path) -> Result<Vec<Taught>> {
-    let objects = table::read(file)?;
+    let objects = table::read_or_empty(file)?;
     let mut examples = Vec::new();
     for object in &objects {
         let Some(kind) = object.kind else { continue };
@@ -146,7 +146,7 @@ pub fn in_table(file: &Path) -> Result<Vec<Taught>> {
     }
     let unlabelled = objects.iter().filter(|object| object.kind.is_none()).count();
     ensure!(
-        !examples.is_empty(),
+        !examples.is_empty() || objects.is_empty(),
         "{} has no labelled detection: fill in the column {}, plant or weed",
         file.display(),
         table::LABEL

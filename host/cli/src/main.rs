@@ -58,7 +58,7 @@ use uno_run::firmware;
     after_help = "Each command's --help has examples.\n\
         A report goes into a folder (--out FOLDER), and a single table into a file (--out FILE.csv).\n\
         Existing files are replaced only with --force; a log of `record` or `monitor` is continued.\n\
-        - is standard input for a file that is read.\n\
+        - is standard input where a command's help says so.\n\
         Status 0: success.\n\
         Status 1: a plant was damaged, something differs, a bound is over its budget, or the machine refused a command.\n\
         Status 2: an error. The message says what would be right."
@@ -377,6 +377,34 @@ mod tests {
         fs::write(&report, "mine").unwrap();
         run("merge DIR/trial.part --brief --force --out DIR/reports").expect("it is told to");
         assert!(fs::read_to_string(&report).unwrap().contains("<svg"));
+    }
+
+    #[test]
+    fn an_output_is_no_other_file_of_its_command() {
+        let folder = tempfile::tempdir().expect("there is room for a folder");
+        let refusal = |words: &str| {
+            let words = format!("weeder {words}").replace("DIR", folder.path().to_str().expect("it is text"));
+            let parsed = parse::<Arguments>(words.split(' ').map(OsString::from).collect());
+            parsed.err().map(|error| error.to_string()).unwrap_or_default()
+        };
+        for words in [
+            "plan --out DIR/new --sheets DIR/./new",
+            "train --synthetic --out DIR/new.csv --picture DIR/new.csv",
+            "map DIR/log.csv --out DIR/new --table DIR/log.csv --force",
+            "merge DIR/1.part DIR/2.part --out DIR/1.part --force",
+            "sim --field DIR/field.toml --vcd DIR/field.toml --force",
+            "settings pull DIR/rows.toml --rows-file DIR/rows.toml --force",
+        ] {
+            let said = refusal(words);
+            assert!(said.contains(" has two uses in this command: name another output"), "{words}: {said}");
+        }
+        for words in ["merge -", "hex -", "hex DIR/new --elf -", "record --out -", "plan --out DIR/new --sheets -"] {
+            let said = refusal(words);
+            assert!(said.contains("- is no file here: name one"), "{words}: {said}");
+        }
+        for words in ["plan --out DIR/new --sheets DIR/page", "sweep --x k=1..2:1 --field walked --out walked"] {
+            assert_eq!(refusal(words), "", "{words}");
+        }
     }
 
     #[test]

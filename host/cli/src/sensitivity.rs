@@ -8,6 +8,7 @@ use field::conditions::{self, Conditions, PARAMETERS};
 use field::tool_path::Effect;
 use frame::{number_within, say, source, whole_within, with_bar};
 use link::settings::Setting;
+use std::collections::HashSet;
 use std::str::FromStr;
 use study::experiment::{Engine, Experiment, Treatment, totals};
 use study::statistics::Share;
@@ -77,7 +78,9 @@ impl FromStr for Change {
             Some((name.to_owned(), value))
         };
         let values: Option<Vec<(String, f64)>> = text.split(',').map(one).collect();
-        values.map(Self).ok_or_else(|| "it has to be NAME=VALUE, as crop.canopy_mm=250".to_owned())
+        let values = values.ok_or_else(|| "it has to be NAME=VALUE, as crop.canopy_mm=250".to_owned())?;
+        let names = values.iter().map(|(name, _)| name).collect::<HashSet<_>>().len();
+        if names < values.len() { Err("a name is in it twice".to_owned()) } else { Ok(Self(values)) }
     }
 }
 
@@ -184,7 +187,7 @@ mod tests {
 
     #[test]
     fn text_that_is_no_change_is_refused() {
-        for text in ["", "crop.canopy_mm", "crop.canopy_mm=wide", "a=1,", "machine.arm=hanging"] {
+        for text in ["", "crop.canopy_mm", "crop.canopy_mm=wide", "a=1,", "machine.arm=hanging", "a=1,b=1,a=2"] {
             assert!(text.parse::<Change>().is_err(), "{text}");
         }
         assert_eq!("machine.arm=trailing".parse(), Ok(Change(vec![("machine.arm".to_owned(), 1.0)])));

@@ -23,7 +23,8 @@ use mechanics::design::Design;
 use mechanics::machine::{Input, Machine};
 use mechanics::swing::Swing;
 use mechanics::unit::MM;
-use set_up::{ManualStep, Task, steps};
+use set_up::circle::Arm;
+use set_up::{ManualStep, SetUp, Task, steps};
 use std::fmt;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -58,12 +59,13 @@ pub struct Arguments {
 
 /// The measures from which `weeder design` calculates the stroke: the key in a machine file, and the question.
 const TOOL_WIDTH: &str = "intra_row.width";
-const ASKED: [(&str, &str); 8] = [
+const ASKED: [(&str, &str); 9] = [
     (TOOL_WIDTH, "The tool's width"),
     ("intra_row.shank_length", "The arm's length, from the servo's axis to the blade's tip"),
     ("intra_row.blade_height", "The blade's height"),
     ("intra_row.servo_torque", "The servo's greatest torque"),
     ("swing.servo_time_60", "The servo's time for 60 degrees without load"),
+    ("swing.pulse_for_90", "The pulse's change in us for 90 degrees: 1000 for most, 667 for servos of 270 degrees"),
     ("swing.protected", "The width round a stem that no tool may enter"),
     ("swing.stem_off", "How far a stem may stand off the middle of its canopy"),
     ("swing.room", "Room beside the stem zone, for plants off the line and a machine that strays"),
@@ -82,14 +84,15 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let kept_state =
         State::parse(&kept).with_context(|| format!("{} is no file of `weeder set-up`", path.display()))?;
     let mut state = if arguments.again { State::default() } else { kept_state };
+    whole_file::check(path).with_context(|| format!("{} cannot be written", path.display()))?;
     let machine = arguments.machine.as_deref().map(mechanics::file::read).transpose()?;
-    let trailing = machine.filter(|machine| machine.swing.arm_trails > 0);
-    state.measured.trailing_tool_mm = trailing.map(|machine| MM.value(machine.intra_row.width).ceil() as u16);
+    let known = machine.map_or_else(|| asked(&state), Ok)?;
+    take_arm(&mut state.measured, &known);
     let board = Board::at(&arguments.port.board()?.port()?)?;
     state.take_board(&board, path)?;
     let link = board.open()?;
     match (Guide { link, state, machine, typed: input::typed(), path: path.clone(), watches: false }).lead() {
-        Err(error) if error.downcast_ref() == Some(&End::Stop) => say!("Stopped. The same command continues here."),
+        Err(error) if error.is::<End>() => say!("Stopped. The same command continues here."),
         ended => ended,
     }
 }
@@ -119,9 +122,13 @@ struct Guide {
 
 impl Guide {
     fn lead(mut self) -> Result<()> {
+        say!("Enter takes what stands in [brackets], s leaves a step out, q stops.")?;
         match settings::status(&mut self.link)? {
-            // A new board has no saved settings. This saves the present ones.
+            // A new board, or one that has lost its settings.
             Status { alarm: Some(Alarm::SettingsLost), .. } => {
+                say!("The board has no saved settings: alarm 5-1 settings_lost. If a file has them, type q.")?;
+                say!("Then `weeder settings push FILE.toml` restores them.")?;
+                self.go("Save its present settings, and clear the alarm")?;
                 self.link.ask("save")?;
                 self.link.ask("clear")?;
             }
@@ -133,7 +140,6 @@ impl Guide {
             _ => {}
         }
         self.link.ask("events on")?;
-        say!("Enter takes what stands in [brackets], s leaves a step out, q stops.")?;
         self.compare()?;
         let steps = steps();
         let count = steps.len();
@@ -330,10 +336,10 @@ impl Guide {
                 for (name, question) in ASKED {
                     self.measure(name, question)?;
                 }
-                let text: String = self.state.asked.iter().map(|(key, value)| written(key, *value)).collect();
-                mechanics::file::parse(Path::new("the machine"), &text)?
+                asked(&self.state)?
             }
         };
+        take_arm(&mut self.state.measured, &machine);
         let torque = Design::of(&machine)?.servo_torque;
         let swing = match Swing::fitted(&machine, torque, &settings::read(&mut self.link)?) {
             Ok(swing) => swing,
@@ -361,7 +367,8 @@ impl Guide {
     fn measure(&mut self, name: &str, question: &str) -> Result<()> {
         let Some(input) = input(&Machine::default(), name) else { return Ok(()) };
         let before = self.state.asked.get(name).map(f64::to_string);
-        let value = self.ask_for(&format!("{question}, in {}", input.unit), before.as_deref(), |typed| {
+        let unit = if input.unit.is_empty() { String::new() } else { format!(", in {}", input.unit) };
+        let value = self.ask_for(&format!("{question}{unit}"), before.as_deref(), |typed| {
             let value = typed.parse().ok().filter(|value| (input.least..=input.most).contains(value));
             value.ok_or_else(|| format!("it has to be a number {}", input.range()))
         })?;
@@ -415,5 +422,19 @@ fn input(machine: &Machine, name: &str) -> Option<Input> {
 /// A measure as a line of a machine file.
 fn written(name: &str, value: f64) -> String {
     let input = input(&Machine::default(), name);
-    input.map_or_else(String::new, |input| format!("{name} = \"{value} {}\"\n", input.unit))
+    input.map_or_else(String::new, |input| format!("{name} = {}\n", Input { value, ..input }.written()))
+}
+
+/// The machine of the measures that were asked. The rest is the paper's.
+fn asked(state: &State) -> Result<Machine> {
+    let text: String = state.asked.iter().map(|(key, value)| written(key, *value)).collect();
+    Ok(mechanics::file::parse(Path::new("the machine"), &text)?)
+}
+
+/// Calculates leads and margin with a machine's arm.
+fn take_arm(measured: &mut SetUp, machine: &Machine) {
+    let tool_mm = MM.value(machine.intra_row.width).ceil() as u16;
+    measured.trailing_tool_mm = (machine.swing.arm_trails > 0).then_some(tool_mm);
+    let length_mm = MM.value(machine.intra_row.shank_length);
+    measured.arm = Arm { length_mm, us_for_90: machine.swing.pulse_for_90 };
 }

@@ -1,11 +1,12 @@
 //! `weeder settings`: saves the machine's settings to a file, compares them, and sends them to a machine.
 
 use crate::ports::{Chosen, Ports};
-use anyhow::{Result, ensure};
+use anyhow::{Result, bail, ensure};
 use clap::{Args, Subcommand};
 use comfy_table::{Table, presets};
+use control::alarm::Alarm;
 use field::conditions::Conditions;
-use frame::{Finding, OutFolder, OutName, Replace, say, source};
+use frame::{Finding, OutFolder, OutName, Replace, say, source, tell};
 use link::row_names::Row;
 use link::settings::{self, Setting, SettingsError, Shown, name, unit};
 use link::settings_file::{self, Named};
@@ -95,7 +96,19 @@ fn pull(file: Option<&OutName>, replace: Replace, json: bool, chosen: &Chosen) -
         folder if chosen.are_several => Some(Chosen::file_in(folder, row, "toml")),
         file => Some(file.to_owned()),
     };
-    let pulled = chosen.each(|_, link| Ok(settings::read_shown(link)?));
+    let pulled = chosen.each(|row, link| {
+        let shown = settings::read_shown(link)?;
+        // Another version's status may be unknown.
+        if settings::status(link).is_ok_and(|status| status.alarm == Some(Alarm::SettingsLost)) {
+            const LOST: &str = "the machine has lost its settings, or is new (alarm 5-1): it has the factory's";
+            if let Some(path) = path(row).filter(|path| path.exists()) {
+                let path = path.display();
+                bail!("{LOST}, and {path} is not replaced. `weeder settings push {path}` restores them");
+            }
+            tell!("{}: {LOST}", row.name);
+        }
+        Ok(shown)
+    });
     let write = |(row, pulled): (&Row, Result<Shown>)| {
         let settings = pulled?;
         folder.as_ref().map_or(Ok(()), OutFolder::make)?;
@@ -161,7 +174,8 @@ impl Chosen {
             let wanted = wanted(file)?;
             return Ok(self.rows.iter().map(|row| (row.name.clone(), wanted.clone())).collect());
         }
-        ensure!(self.are_several, "{} is a folder: name a file", file.display());
+        let has_all = self.rows.iter().all(|row| Self::file_in(file, row, "toml").is_file());
+        ensure!(self.are_several || has_all, "{} is a folder: name a file", file.display());
         self.rows.iter().map(|row| Ok((row.name.clone(), wanted(&Self::file_in(file, row, "toml"))?))).collect()
     }
 

@@ -7,16 +7,18 @@
 //!
 //! An existing file may hold a user's work: a filled-in table, tuned settings, comments. A command cannot detect that.
 //! So no command replaces a file without [`Replace`], the option `--force`. A test in `main.rs` checks every argument
-//! that names an output.
+//! that names an output. `--force` does not allow an output that is also another file of its command: [`check`].
 
 use crate::say;
 use anyhow::{Context, Result, bail, ensure};
-use clap::Args;
+use clap::{ArgMatches, Args};
+use field::conditions::Conditions;
 use files::whole_file;
+use std::any::Any;
 use std::ffi::OsString;
 use std::fs;
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::{self, Path, PathBuf};
 
 /// Endings of files that commands write. A folder's name hardly ends so.
 const FILE_ENDINGS: [&str; 9] = ["csv", "geojson", "hex", "html", "json", "rs", "svg", "toml", "vcd"];
@@ -125,6 +127,45 @@ impl OutFolder {
     pub fn path(&self) -> &Path {
         &self.folder
     }
+}
+
+/// Checks the files of a parsed command line. Fails, in words, if an output is also an input or another output. A `-`
+/// that is left names no file: a parser replaces it where standard input is read.
+pub(crate) fn check(words: &ArgMatches) -> Result<(), String> {
+    if let Some((_, words)) = words.subcommand() {
+        return check(words);
+    }
+    let field = words.try_get_one::<String>("field").ok().flatten();
+    let field = field.filter(|field| Conditions::preset(field).is_none());
+    let inputs: Vec<&Path> = values::<PathBuf>(words).map(PathBuf::as_path).chain(field.map(Path::new)).collect();
+    let outputs: Vec<&Path> = values::<OutName>(words).map(OutName::path).collect();
+    if inputs.iter().chain(&outputs).any(|path| path.as_os_str() == "-") {
+        return Err("- is no file here: name one".to_owned());
+    }
+    let mut taken: Vec<PathBuf> = inputs.into_iter().map(full).collect();
+    for output in outputs {
+        let full = full(output);
+        let is_device = full.metadata().is_ok_and(|there| !there.is_file());
+        if !is_device && taken.contains(&full) {
+            return Err(format!("{} has two uses in this command: name another output", output.display()));
+        }
+        taken.push(full);
+    }
+    Ok(())
+}
+
+/// The values of this type, of all arguments.
+fn values<T: Any + Clone + Send + Sync>(words: &ArgMatches) -> impl Iterator<Item = &T> {
+    words.ids().filter_map(move |id| words.try_get_many::<T>(id.as_str()).ok().flatten()).flatten()
+}
+
+/// One path for all names of a file. The file may not exist yet.
+fn full(name: &Path) -> PathBuf {
+    let in_folder = || {
+        let name = path::absolute(name).ok()?;
+        Some(name.parent()?.canonicalize().ok()?.join(name.file_name()?))
+    };
+    name.canonicalize().ok().or_else(in_folder).unwrap_or_else(|| name.to_owned())
 }
 
 /// Writes a file that the user asked for, and prints its name behind a title, unless the output is JSON.

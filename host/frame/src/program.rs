@@ -1,7 +1,7 @@
 //! The frame of the programs `weeder` and `weeder-sim`: they parse their words, run a command, and exit with a status.
 
 use crate::numbers::with_negative_numbers;
-use crate::tell;
+use crate::{destination, tell};
 use anyhow::Result;
 use clap::builder::StyledStr;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
@@ -53,9 +53,13 @@ pub fn grammar<A: Parser>() -> Command {
 /// Parses a command line.
 ///
 /// # Errors
-/// As clap. For an unknown command, the error lists the known ones.
+/// As clap. For an unknown command, the error lists the known ones. An output has to be a file of its own.
 pub fn parse<A: Parser>(words: Vec<OsString>) -> Result<A, clap::Error> {
-    let found = grammar::<A>().try_get_matches_from(&words).and_then(|found| A::from_arg_matches(&found));
+    let found = grammar::<A>().try_get_matches_from(&words).and_then(|found| {
+        destination::check(&found)
+            .map_err(|problem| clap::Error::raw(ErrorKind::ValueValidation, format!("{problem}\n")))?;
+        A::from_arg_matches(&found)
+    });
     found.map_err(|mut error| {
         if error.kind() == ErrorKind::InvalidSubcommand {
             let mut command = grammar::<A>();

@@ -89,7 +89,7 @@ fn others(ports: &[String]) -> String {
 
 fn remedy(without_port: &[&str]) -> String {
     const OF_THE_SYSTEM: &str = if cfg!(target_os = "linux") {
-        "on Linux, brltty may have taken it: remove that program with `sudo apt remove brltty`, then plug it in again"
+        "on Linux, brltty may have taken it: remove the package brltty (`sudo apt remove brltty`), then plug it in again"
     } else {
         "install the driver of its maker, then plug it in again"
     };

@@ -6,15 +6,35 @@
 //! inside the zone. The faster the machine, the longer is this distance and the shorter its time. So leads for the
 //! highest speed hold below it.
 
-/// The arm of the paper's machine. A longer arm swings farther aside.
-const ARM_MM: f64 = 350.0;
+/// An arm and its servo. The default is the paper's. A longer arm swings farther aside, and leads save less.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Arm {
+    /// From the servo's axis to the blade's tip, mm.
+    pub length_mm: f64,
+    /// Change of the pulse that turns the servo by 90 degrees, us.
+    pub us_for_90: f64,
+}
 
-/// Pulse for a degree of a servo with 1000 us for 90 degrees.
-const US_A_DEGREE: f64 = 1000.0 / 90.0;
+impl Default for Arm {
+    fn default() -> Self {
+        Self { length_mm: 350.0, us_for_90: 1000.0 }
+    }
+}
 
-/// How far a stroke of this pulse carries the paper's arm aside, mm.
-pub fn aside_mm(pulse_us: u16) -> f64 {
-    ARM_MM * (f64::from(pulse_us) / US_A_DEGREE).to_radians().sin()
+impl Arm {
+    /// How far a stroke of this pulse carries the tool aside, mm.
+    pub fn aside_mm(self, pulse_us: u16) -> f64 {
+        self.length_mm * (90.0 * f64::from(pulse_us) / self.us_for_90).min(90.0).to_radians().sin()
+    }
+
+    /// How much farther a trailing arm has to keep off, mm, for a stroke of this pulse. A zone of 0 is a whole canopy: the
+    /// tool has to be fully out over it. `rolled_mm` is as for [`carried_mm`].
+    pub fn carried_by_stroke_mm(self, pulse_us: u16, tool_mm: f64, zone_mm: f64, rolled_mm: f64) -> f64 {
+        if zone_mm > 0.0 {
+            return carried_mm(self.length_mm, tool_mm, zone_mm, rolled_mm);
+        }
+        self.length_mm - (self.length_mm.powi(2) - self.aside_mm(pulse_us).powi(2)).sqrt()
+    }
 }
 
 /// How far a swing may overlap either end of a zone, mm. The stroke takes `travel_ms`.
@@ -32,15 +52,6 @@ pub fn rolled_mm(speed_mm_s: f64, travel_ms: f64, zone_mm: f64, aside_mm: f64) -
 /// The same as a time, ms.
 pub fn overlap_ms(speed_mm_s: f64, travel_ms: f64, zone_mm: f64, aside_mm: f64) -> f64 {
     if zone_mm <= 0.0 { 0.0 } else { 1000.0 * overlap_mm(speed_mm_s, travel_ms, zone_mm, aside_mm) / speed_mm_s }
-}
-
-/// How much farther a trailing arm of the paper's length has to keep off, mm, for a stroke of this pulse. A zone of 0 is
-/// a whole canopy: the tool has to be fully out over it. `rolled_mm` is as for [`carried_mm`].
-pub fn carried_by_stroke_mm(pulse_us: u16, tool_mm: f64, zone_mm: f64, rolled_mm: f64) -> f64 {
-    if zone_mm > 0.0 {
-        return carried_mm(ARM_MM, tool_mm, zone_mm, rolled_mm);
-    }
-    ARM_MM - (ARM_MM * ARM_MM - aside_mm(pulse_us).powi(2)).sqrt()
 }
 
 /// How much farther a trailing arm's margin has to be, mm: it carries the tool towards the zone before the edge has left
@@ -92,7 +103,7 @@ mod tests {
         assert!(ms(278.0) > ms(694.0) && ms(694.0) > ms(1300.0) && ms(1300.0) > 10.0);
         assert!(overlap_mm(1.0, 60.0, 110.0, 134.0) < 0.1);
         assert_eq!(overlap_ms(694.0, 60.0, 0.0, 134.0), 0.0);
-        assert!((aside_mm(250) - 133.9).abs() < 0.1);
+        assert!((Arm::default().aside_mm(250) - 133.9).abs() < 0.1);
     }
 
     #[test]
@@ -104,6 +115,6 @@ mod tests {
         let fast_mm = carried_mm(350.0, 130.0, 110.0, rolled_mm(1300.0, 60.0, 110.0, 134.0));
         assert!((12.7..14.0).contains(&fast_mm), "{fast_mm}");
         // Around a canopy, 22.5 degrees carry it by 26.6 mm.
-        assert!((carried_by_stroke_mm(250, 130.0, 0.0, 0.0) - 26.6).abs() < 0.1);
+        assert!((Arm::default().carried_by_stroke_mm(250, 130.0, 0.0, 0.0) - 26.6).abs() < 0.1);
     }
 }

@@ -1,6 +1,7 @@
 //! The leads that follow from the servo's measured times.
 
-use crate::{circle, keeps_stems, stroke_us};
+use crate::circle::{self, Arm};
+use crate::{keeps_stems, stroke_us};
 use control::settings::{Setting, Settings};
 
 /// The servo's scatter beside a stem zone, as a time on its way out and in. The way out has the dead time's scatter, the
@@ -16,33 +17,42 @@ const BESIDE_STROKE_MS: f64 = 40.0;
 /// The servo, timed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Timing {
-    /// The leads in milliseconds, out and in. `None` if the operator sets them by eye.
-    pub(crate) leads: Option<(u16, u16)>,
-    /// The pulse widths of the stroke.
-    pub(crate) pulses: (u16, u16),
+    /// The leads in milliseconds, out and in. By eye, `None` until the operator has set what was seen.
+    pub(crate) leads: [Option<u16>; 2],
+    /// Whether the operator timed it by eye.
+    pub(crate) by_eye: bool,
+    /// The values of [`OVER`](crate::OVER).
+    pub(crate) over: [u16; 3],
 }
 
-/// The leads that follow from the times. None if the operator sets them by eye.
-pub(crate) fn leads(timings: &[Timing], settings: &Settings) -> Vec<(Setting, u16)> {
-    let Some([(_, longest_ms), (shortest_ms, _)]) = extremes(timings) else { return Vec::new() };
+/// The leads that follow from the times. Those seen by eye are not shortened.
+pub(crate) fn leads(timings: &[Timing], settings: &Settings, arm: Arm) -> Vec<(Setting, u16)> {
     let [saved_out_ms, saved_in_ms] = if keeps_stems(settings) {
         let [top_mm_s, zone_mm] =
             [Setting::TopSpeedMmS, Setting::StemZoneMm].map(|setting| settings.get(setting).into());
-        saved_ms(top_mm_s, travel_ms(timings), zone_mm, circle::aside_mm(stroke_us(settings)))
+        saved_ms(top_mm_s, travel_ms(timings), zone_mm, arm.aside_mm(stroke_us(settings)))
     } else {
         [0, 0]
     };
-    vec![
-        (Setting::LeadOutMs, longest_ms.saturating_sub(saved_out_ms)),
-        (Setting::LeadInMs, shortest_ms.saturating_add(saved_in_ms)),
-    ]
+    let [out, back] = extremes(timings);
+    let out = out.map(|(_, longest_ms)| (Setting::LeadOutMs, longest_ms.saturating_sub(saved_out_ms)));
+    let back = back.map(|(shortest_ms, _)| (Setting::LeadInMs, shortest_ms.saturating_add(saved_in_ms)));
+    out.into_iter().chain(back).collect()
+}
+
+/// Whether a time may be the operator's, who adds a reserve.
+pub(crate) fn by_eye(timings: &[Timing]) -> bool {
+    timings.iter().any(|timing| timing.by_eye)
 }
 
 /// The time of the stroke, from the times that were measured; 0 if it was timed by eye.
 pub(crate) fn travel_ms(timings: &[Timing]) -> f64 {
-    let differ_ms =
-        extremes(timings).map_or(0, |[(_, longest_ms), (shortest_ms, _)]| longest_ms.saturating_sub(shortest_ms));
-    (f64::from(differ_ms) - BESIDE_STROKE_MS).max(0.0)
+    match extremes(timings) {
+        [Some((_, longest_ms)), Some((shortest_ms, _))] if !by_eye(timings) => {
+            (f64::from(longest_ms.saturating_sub(shortest_ms)) - BESIDE_STROKE_MS).max(0.0)
+        }
+        _ => 0.0,
+    }
 }
 
 /// By how much the leads out and in beside a stem zone are shorter than the worst times: what the circle allows at the
@@ -53,9 +63,10 @@ pub fn saved_ms(top_speed_mm_s: f64, travel_ms: f64, zone_mm: f64, aside_mm: f64
     [SCATTER_OUT_MS, SCATTER_IN_MS].map(|scatter_ms| (overlap_ms + scatter_ms * of_60_ms) as u16)
 }
 
-/// The least and the greatest of the leads out, and of the leads in. `None` if none was timed.
-pub(crate) fn extremes(timings: &[Timing]) -> Option<[(u16, u16); 2]> {
-    let (outs, ins): (Vec<u16>, Vec<u16>) = timings.iter().filter_map(|timing| timing.leads).unzip();
-    let ends = |leads: &[u16]| leads.iter().min().copied().zip(leads.iter().max().copied());
-    Some([ends(&outs)?, ends(&ins)?])
+/// The least and the greatest of the leads out, and of the leads in. `None` if none is known.
+pub(crate) fn extremes(timings: &[Timing]) -> [Option<(u16, u16)>; 2] {
+    [0, 1].map(|way: usize| {
+        let leads = || timings.iter().filter_map(move |timing| timing.leads[way]);
+        leads().min().zip(leads().max())
+    })
 }

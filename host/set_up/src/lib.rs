@@ -14,7 +14,7 @@
 //! along the row.
 //!
 //! The margin covers only measured values: if one is missing there is no sum, and the default margin stays. A few measurements do not show the
-//! worst case, so each scatter has a least value. Times that were measured over another stroke do not count.
+//! worst case, so each scatter has a least value. Times that were measured over another stroke or gap do not count.
 
 pub mod circle;
 mod leads;
@@ -27,7 +27,8 @@ pub use self::margin::Margin;
 pub use self::next_step::Step;
 pub use self::steps::{ManualStep, Task, steps};
 
-use self::leads::{Timing, extremes, leads, travel_ms};
+use self::circle::Arm;
+use self::leads::{Timing, by_eye, extremes, leads, travel_ms};
 
 use control::say::command::{Action, Command};
 use control::settings::{Setting, Settings};
@@ -74,6 +75,8 @@ pub struct SetUp {
     sets_margin: bool,
     /// The width of a tool on a trailing arm, mm. `None` for a pendulum.
     pub trailing_tool_mm: Option<u16>,
+    /// The arm, which swings the tool aside.
+    pub arm: Arm,
     /// The settings in use, as far as the session shows them.
     pub settings: Settings,
     timings: Vec<Timing>,
@@ -82,14 +85,20 @@ pub struct SetUp {
     slip_permille: VecDeque<i32>,
 }
 
-/// The pulse widths of the servo's stroke, in and out.
-fn pulses(settings: &Settings) -> (u16, u16) {
-    (settings.get(Setting::ServoInUs), settings.get(Setting::ServoOutUs))
+/// The settings over which a timing counts: the pulse widths of the stroke, and the gap that a command waits for.
+const OVER: [Setting; 3] = [Setting::ServoInUs, Setting::ServoOutUs, Setting::ServoGapMs];
+
+/// The leads, out and in.
+const LEADS: [Setting; 2] = [Setting::LeadOutMs, Setting::LeadInMs];
+
+/// The values of [`OVER`].
+fn over(settings: &Settings) -> [u16; 3] {
+    OVER.map(|setting| settings.get(setting))
 }
 
 /// The length of the stroke, as a pulse width.
 fn stroke_us(settings: &Settings) -> u16 {
-    let (in_us, out_us) = pulses(settings);
+    let [in_us, out_us, _] = over(settings);
     in_us.abs_diff(out_us)
 }
 
@@ -116,11 +125,15 @@ impl SetUp {
     /// The lines from which [`SetUp::of_lines`] makes the same measurements.
     pub fn lines(&self) -> Vec<String> {
         let mut lines = Vec::new();
-        for Timing { leads, pulses: (in_us, out_us) } in &self.timings {
-            lines.extend([format!("servo_in_us={in_us}"), format!("servo_out_us={out_us}")]);
-            lines.push(leads.map_or("calibrated by=eye, as seen".to_owned(), |(out_ms, in_ms)| {
-                format!("calibrated lead_out_ms={out_ms} lead_in_ms={in_ms} set=yes")
-            }));
+        for Timing { leads, by_eye, over } in &self.timings {
+            lines.extend(OVER.into_iter().zip(over).map(|(setting, value)| format!("{}={value}", setting.text())));
+            if let ([Some(out_ms), Some(in_ms)], false) = (leads, by_eye) {
+                lines.push(format!("calibrated lead_out_ms={out_ms} lead_in_ms={in_ms} set=yes"));
+                continue;
+            }
+            lines.push("calibrated by=eye, as seen".to_owned());
+            let seen = LEADS.into_iter().zip(leads);
+            lines.extend(seen.filter_map(|(lead, ms)| ms.map(|ms| format!("> set {} {ms}", lead.text()))));
         }
         for ticks in &self.ticks_per_m {
             lines.extend(["> calibrate 10000".to_owned(), format!("ticks_per_m={ticks}")]);
@@ -149,7 +162,18 @@ impl SetUp {
             Ok(Command { action: Action::Set, setting: Setting::MarginMm, .. }) => self.sets_margin = true,
             // The measurements begin again.
             Ok(Command { action: Action::Set, setting: Setting::TicksPerM, number: 0, .. }) => self.ticks_per_m.clear(),
+            Ok(Command { action: Action::Set, setting, number, .. }) => self.take_seen(setting, number),
             _ => {}
+        }
+    }
+
+    /// Takes a lead that is set after a timing by eye. Only the first is what was seen: a later one may follow advice.
+    fn take_seen(&mut self, lead: Setting, ms: u16) {
+        if let Some(way) = LEADS.iter().position(|&known| known == lead)
+            && let Some(Timing { leads, by_eye: true, .. }) = self.timings.last_mut()
+            && lead.allows(ms)
+        {
+            leads[way].get_or_insert(ms);
         }
     }
 
@@ -163,12 +187,12 @@ impl SetUp {
     }
 
     fn take_event(&mut self, event: &EventLine) {
-        let pulses = pulses(&self.settings);
+        let over = over(&self.settings);
         match *event {
             EventLine::CalibratedBySwitch { out_ms, in_ms, .. } => {
-                self.timings.push(Timing { leads: Some((out_ms, in_ms)), pulses });
+                self.timings.push(Timing { leads: [Some(out_ms), Some(in_ms)], by_eye: false, over });
             }
-            EventLine::CalibratedByEye {} => self.timings.push(Timing { leads: None, pulses }),
+            EventLine::CalibratedByEye {} => self.timings.push(Timing { leads: [None; 2], by_eye: true, over }),
             EventLine::Slip { permille } => {
                 self.slip_permille.push_front(permille);
                 self.slip_permille.truncate(PLANTS);
@@ -177,9 +201,9 @@ impl SetUp {
         }
     }
 
-    /// The servo's timings over the present stroke.
+    /// The servo's timings over the present stroke and gap.
     fn timed(&self, settings: &Settings) -> Vec<Timing> {
-        self.timings.iter().copied().filter(|timing| timing.pulses == pulses(settings)).collect()
+        self.timings.iter().copied().filter(|timing| timing.over == over(settings)).collect()
     }
 
     /// The steps that are missing until the margin can be lowered, in the best order.
@@ -189,11 +213,11 @@ impl SetUp {
         if timings.len() < TIMINGS {
             missing.push(Step::TimeServo(timings.len()));
         } else {
-            for (lead, lead_ms) in leads(&timings, settings) {
+            for (lead, lead_ms) in leads(&timings, settings, self.arm) {
                 let set_ms = settings.get(lead);
                 let is_unsafe = if lead == Setting::LeadOutMs { set_ms < lead_ms } else { set_ms > lead_ms };
-                // Around whole canopies, safer leads are the operator's.
-                if is_unsafe || keeps_stems(settings) && set_ms != lead_ms {
+                // Around whole canopies and by eye, safer leads are the operator's.
+                if is_unsafe || keeps_stems(settings) && !by_eye(&timings) && set_ms != lead_ms {
                     missing.push(Step::SetLead(lead, lead_ms));
                 }
             }
@@ -240,8 +264,8 @@ impl SetUp {
         let speed_m_s = if keeps_stems(settings) { SLOW_M_S } else { SPEED_M_S };
         let arm_mm = self.trailing_tool_mm.map_or(0.0, |tool_mm| {
             let pulse_us = stroke_us(settings);
-            let rolled_mm = circle::rolled_mm(top_mm_s, travel_ms(&timings), zone_mm, circle::aside_mm(pulse_us));
-            circle::carried_by_stroke_mm(pulse_us, tool_mm.into(), zone_mm, rolled_mm)
+            let rolled_mm = circle::rolled_mm(top_mm_s, travel_ms(&timings), zone_mm, self.arm.aside_mm(pulse_us));
+            self.arm.carried_by_stroke_mm(pulse_us, tool_mm.into(), zone_mm, rolled_mm)
         });
         let margin = Margin {
             slip_mm,

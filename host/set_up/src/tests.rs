@@ -85,9 +85,12 @@ fn beside_a_stem_s_zone_leads_and_margin_go_up_to_its_circle() {
     // Beside a zone of 100 mm, 6, 4.2, 8.8 and 2 mm. A trailing arm with a tool of 130 mm needs some millimetres more,
     // and around canopies the 102.5 mm by which 45 degrees carry it.
     let trailing = SetUp { trailing_tool_mm: Some(130), ..set_up.clone() };
+    // A longer arm swings farther aside, so its circle saves less.
+    let longer = SetUp { arm: Arm { length_mm: 500.0, ..Arm::default() }, ..set_up.clone() };
     for (set_up, zone_mm, least_mm, leads) in [
         (&set_up, 0, 22, (158, 52)),
         (&set_up, 100, 21, (127, 72)),
+        (&longer, 100, 21, (130, 69)),
         (&trailing, 100, 32, (127, 72)),
         (&trailing, 0, 124, (158, 52)),
     ] {
@@ -108,11 +111,41 @@ fn a_servo_that_was_timed_by_eye_scatters_by_the_error_of_the_eye() {
 }
 
 #[test]
-fn a_servo_that_was_timed_over_another_stroke_is_to_be_timed_again() {
+fn of_the_times_seen_by_eye_the_safest_count_and_the_scatter_is_in_the_margin() {
+    let seen = [
+        BY_EYE,
+        "> set lead_out_ms 190",
+        "> set lead_in_ms 50",
+        BY_EYE,
+        "> set lead_out_ms 140",
+        "> set lead_in_ms 80",
+    ];
+    // The last line follows the advice.
+    let set_up = heard(&[&seen, &["> set lead_out_ms 190"], MEASURED, THIRD]);
+    let again = SetUp::of_lines(set_up.lines().iter().map(String::as_str));
+    for (out_ms, in_ms, missing) in [
+        (140, 80, vec![Step::SetLead(Setting::LeadOutMs, 190), Step::SetLead(Setting::LeadInMs, 50)]),
+        (190, 50, vec![]),
+        (200, 40, vec![]),
+    ] {
+        let changes = [(Setting::LeadOutMs, out_ms), (Setting::LeadInMs, in_ms), (Setting::StemZoneMm, 110)];
+        let settings = settings(&[&changes[..], &[(Setting::TicksPerM, 1920)]].concat());
+        assert_eq!([&set_up, &again].map(|set_up| set_up.missing(&settings)), [missing.clone(), missing.clone()]);
+        if missing.is_empty() {
+            let margin = set_up.margin(&settings).expect("all was measured");
+            assert!((margin.servo_mm - 50.0 * SLOW_M_S).abs() < 1e-9, "{margin:?}");
+        }
+    }
+}
+
+#[test]
+fn a_servo_that_was_timed_over_another_stroke_or_gap_is_to_be_timed_again() {
     let set_up = heard(&[&["servo_out_us=1795"], TIMED, MEASURED, MEASURED]);
     for (out_us, missing) in [(1795, vec![]), (1800, vec![Step::TimeServo(0)]), (1700, vec![Step::TimeServo(0)])] {
         let changes = [worst_leads(Setting::TicksPerM, 1930), vec![(Setting::ServoOutUs, out_us)]].concat();
         assert_eq!(set_up.missing(&settings(&changes)), missing, "{out_us}");
+        let slower = [changes, vec![(Setting::ServoGapMs, 0)]].concat();
+        assert_eq!(set_up.missing(&settings(&slower)), [Step::TimeServo(0)], "{out_us}");
     }
 }
 

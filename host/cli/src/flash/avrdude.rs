@@ -25,7 +25,7 @@ const GET_IT: &str = if cfg!(windows) {
 } else if cfg!(target_os = "macos") {
     "`brew install avrdude` installs it"
 } else {
-    "`sudo apt install avrdude` or ./setup.sh installs it"
+    "`sudo apt install avrdude`, your system's package avrdude, or ./setup.sh installs it"
 };
 
 /// Writing cannot reach the bootloader.

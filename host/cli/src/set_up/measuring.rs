@@ -18,6 +18,9 @@ const PLANTS: Duration = Duration::from_secs(600);
 const POLL: Duration = Duration::from_millis(200);
 const ROLLED_TICKS: u32 = 500;
 
+/// After this time, a wait for the machine says what the encoder counts.
+const PATIENCE: Duration = Duration::from_secs(5);
+
 /// From this speed on, the machine ends timed swings: 0.05 km/h, rounded up.
 const ROLLS_MM_S: u32 = 15;
 
@@ -68,12 +71,15 @@ impl Guide {
                     self.state.measured.take_line(&line);
                 }
                 _ => {
-                    self.state.measured.take_line(&line);
                     let mut leads = Vec::new();
                     for lead in [Setting::LeadOutMs, Setting::LeadInMs] {
                         leads.push((lead, self.value(lead, None)?));
                     }
                     self.push(&leads)?;
+                    self.state.measured.take_line(&line);
+                    for (lead, ms) in leads {
+                        self.state.measured.take_line(&format!("> set {} {ms}", name(lead)));
+                    }
                 }
             }
             self.keep()?;
@@ -111,15 +117,34 @@ impl Guide {
 
     /// Waits until the machine stands, and returns its position. With `from`, it must first have left that position.
     fn stands_at(&mut self, from: Option<i32>) -> Result<i32> {
-        let mut before = None;
+        let (since, mut before, mut is_told) = (Instant::now(), None, false);
         loop {
             let Status { position, speed_mm_s, .. } = settings::status(&mut self.link)?;
             let has_rolled = from.is_none_or(|from| position.abs_diff(from) > ROLLED_TICKS);
             if has_rolled && speed_mm_s == 0 && before == Some(position) {
                 return Ok(position);
             }
+            if since.elapsed() > PATIENCE {
+                if !std::mem::replace(&mut is_told, true) {
+                    let wanted = if has_rolled { "stand still" } else { "roll farther" };
+                    tell!(
+                        "  The machine has to {wanted}: pos={position} speed_mm_s={speed_mm_s}. If that is wrong, see to the \
+                         encoder. s leaves the step out, q stops."
+                    );
+                }
+                self.obey_typed()?;
+            }
             before = Some(position);
             thread::sleep(POLL);
+        }
+    }
+
+    /// Ends the step if the user has typed that. Drops any other line.
+    fn obey_typed(&self) -> Result<()> {
+        match self.typed.try_recv().as_ref().map(|typed| typed.text.trim()) {
+            Ok("s") => Err(Error::msg(End::LeaveOut)),
+            Ok("q") | Err(TryRecvError::Disconnected) => Err(Error::msg(End::Stop)),
+            _ => Ok(()),
         }
     }
 
@@ -190,11 +215,7 @@ impl Guide {
     fn pass_plant(&mut self) -> Result<()> {
         let deadline = Instant::now() + PLANTS;
         while Instant::now() < deadline {
-            match self.typed.try_recv().as_ref().map(|typed| typed.text.trim()) {
-                Ok("s") => return Err(Error::msg(End::LeaveOut)),
-                Ok("q") | Err(TryRecvError::Disconnected) => return Err(Error::msg(End::Stop)),
-                _ => {}
-            }
+            self.obey_typed()?;
             let Some(line) = self.link.next_line()? else { continue };
             if let ConsoleLine::Event(EventLine::Slip { permille }) = ConsoleLine::parse(&line) {
                 say!("  slip {permille} permille")?;

@@ -115,6 +115,8 @@ fn output_to_a_device_goes_there() {
     let folder = tempfile::tempdir().unwrap();
     let output = weeder(folder.path(), &["sweep", "--field", "small.toml", "--x", "k=1..3:2", "--out", "/dev/null"]);
     assert!(output.status.success());
+    let output = weeder(folder.path(), &["plan", "--out", "/dev/null", "--sheets", "/dev/null"]);
+    assert!(output.status.success());
     assert!(!Path::new("/dev/null").is_file());
 }
 

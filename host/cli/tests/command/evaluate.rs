@@ -1,7 +1,7 @@
 //! `weeder evaluate` as a user runs it: on the manual's example, on trials that are too small for a model, and on wrong
 //! tables.
 
-use crate::common::{assert_refused, said};
+use crate::common::{assert_refused, said, weeder};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -34,7 +34,7 @@ fn the_manual_s_example_is_evaluated_in_plain_words_and_tables() {
         "24 plots of 8 treatments (1, 1.5, 2 and 2.5 km/h; 50 and 60 cm), 3 of each treatment.",
         "13 of 1318 plants were damaged: 0.99 %, two-sided 95 % interval 0.52 to 1.69 %. At most 4.00 % in each of these plots",
         "the odds that a plant is damaged are 4.49 times as high for each km/h more (1.17 to 17.24; p = 0.0306)",
-        "Performance index scatters more at some speeds or spacings than at others (p = 0.0192)",
+        "Performance index scatters more at some speeds or spacings than at others (p = 0.0192): its p-values are not exact.",
         "Plant damage rises by 1.292 points for each km/h (p = 0.0119) and shows no effect of spacing (p = 0.5347)",
         "- Eq. 29 has -0.2068 a cm, where the text has +0.2068: one sign is wrong.",
     ] {
@@ -124,6 +124,11 @@ fn a_log_gives_each_plot_its_speed_and_what_the_table_leaves_empty() {
     assert!(page.contains("lines of the log") && page.contains("row.csv"), "the report has the log's table");
     let one = ["evaluate", "trial.csv", "--log", "row.csv", "--plots", "1"];
     assert_refused(folder.path(), &one, "stretches of work in the log: 2, plots: 1. Say which plot each stretch is");
+    let labelled = format!("plot,{HEADER}P1,1,1.8,50,100,12,,0,,,0.4,2.5\nP2,1,3.6,50,100,18,,1,,,0.4,2.5\n");
+    fs::write(folder.path().join("trial.csv"), labelled).unwrap();
+    assert_refused(folder.path(), &one[..4], "replication 1 of 1.8 km/h and 50 cm has no number of its own");
+    let told = String::from_utf8(weeder(folder.path(), &one[..2]).stderr).unwrap();
+    assert!(told.contains("so plots have the numbers of their lines"), "{told}");
 }
 
 #[test]

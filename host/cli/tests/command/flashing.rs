@@ -190,7 +190,7 @@ fn a_firmware_that_reaches_into_the_old_bootloader_is_refused() {
     assert_refused(&flash(&["--old-bootloader"]), "takes 30722 bytes of flash: the bootloader leaves 30720");
     assert_refused(
         &flash(&[]),
-        "avrdude cannot be started: `sudo apt install avrdude` or ./setup.sh installs it, or flash in the page",
+        "avrdude cannot be started: `sudo apt install avrdude`, your system's package avrdude, or ./setup.sh installs it, or",
     );
 }
 

@@ -96,6 +96,9 @@ fn settings_are_pulled_changed_compared_and_pushed() {
     printed(&weeder(&["settings", "pull", name], uno.path(), ""), 0);
     let text = fs::read_to_string(&file).expect("it was written");
     assert!(text.contains("\n# 200 to 800 mm, default 400\nwheel_mm = 400\n"), "{text}");
+    // A machine that has lost its settings has the factory's.
+    let lost = printed(&weeder(&["settings", "pull", name, "--force"], uno.path(), ""), 2);
+    assert!(lost.contains("(alarm 5-1)") && lost.contains("machine.toml is not replaced"), "{lost}");
     let same = printed(&weeder(&["settings", "diff", name], uno.path(), ""), 0);
     assert!(same.starts_with("The machine has the settings of "), "{same}");
 
@@ -136,6 +139,7 @@ fn examples_are_pulled_taught_to_another_machine_and_compared() {
     assert!(refused.contains("1 of 2 examples") && refused.contains("--force"), "{refused}");
     let nothing = printed(&weeder(&["examples", "pull", again], uno.path(), ""), 0);
     assert!(nothing.ends_with(": 0 examples\n"), "{nothing}");
+    printed(&weeder(&["examples", "diff", again], uno.path(), ""), 0);
     let pushed = printed(&weeder(&["examples", "push", taught, "--force"], uno.path(), ""), 0);
     assert_eq!(pushed, "Taught: 2. Known already: 0.\n");
     let pushed = printed(&weeder(&["examples", "push", taught, "--force", "--json"], uno.path(), ""), 0);
@@ -162,6 +166,9 @@ fn examples_are_pulled_taught_to_another_machine_and_compared() {
     fs::write(taught, format!("{heading}278,250,300,120,459,\n")).expect("it can be written");
     let refused = printed(&weeder(&["examples", "push", taught], other.path(), ""), 2);
     assert!(refused.contains("has no labelled detection"), "{refused}");
+    fs::write(taught, heading).expect("it can be written");
+    let pushed = printed(&weeder(&["examples", "push", taught, "--replace"], other.path(), ""), 0);
+    assert_eq!(pushed, "Taught: 0. Known already: 0.\nForgotten: 2.\n");
 }
 
 #[test]

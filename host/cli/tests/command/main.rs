@@ -16,6 +16,7 @@ mod full_screen;
 mod host_tools;
 mod language;
 mod manual;
+mod maps;
 mod newer;
 mod plan;
 mod printing;

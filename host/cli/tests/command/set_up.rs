@@ -209,6 +209,12 @@ fn a_file_that_is_another_s_is_not_written_over() {
         &["set-up", "--port", "/dev/no-such-port"],
         "set-up.txt is no file of",
     );
+    // Before anything is measured.
+    crate::common::assert_refused(
+        folder.path(),
+        &["set-up", "--state", "no/such.txt", "--port", "/dev/no-such-port"],
+        "no/such.txt cannot be written",
+    );
     assert_eq!(fs::read_to_string(folder.path().join("set-up.txt")).expect("it is there"), "mine\n");
     assert!(!Path::new("set-up.txt").exists());
 }
@@ -336,7 +342,8 @@ fn a_person_sets_the_virtual_uno_up_from_the_first_question_to_the_last() {
     let (_other, _) = uno(folder.path(), &["--stand", "--link", "other"]);
     let third = lead(folder.path(), &["--port", "./other"], |text, keyboard| {
         if text.ends_with("]: ") {
-            type_to(keyboard, if text.contains("Go on with the board's") { "" } else { "q" });
+            let goes_on = text.contains("Go on with the board's") || text.contains("clear the alarm");
+            type_to(keyboard, if goes_on { "" } else { "q" });
         }
     });
     assert!(third.contains("servo_out_us is 2000, and was 1750"), "{third}");
@@ -349,17 +356,17 @@ fn without_a_machine_s_file_its_measures_are_asked_and_nothing_else_is_offered()
     let folder = TempDir::new().expect("there is room for a folder");
     let (_uno, _) = uno(folder.path(), &["--stand", "--link", "uno"]);
     // Step 2 with a beam that is too near at first.
-    let mut input = vec!["s", "", "300", "", "", "90", "s"];
+    let mut input = vec!["", "s", "", "300", "", "", "90", "s"];
     // Step 5 by a person's own measures, one of them out of range at first.
     input.extend([
-        "maybe", "", "", "300", "2.5", "40", "0.2", "900", "80", "20", "15", "", "", "", "", "", "s", "s", "s",
+        "maybe", "", "", "300", "2.5", "40", "0.2", "800", "900", "80", "20", "15", "", "", "", "", "", "s", "s", "s",
     ]);
     let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
     command.current_dir(&folder).args(["set-up", "--port", "./uno"]);
     let printed = printed(&typed(&mut command, input.join("\n") + "\n"), 0);
     let machine = "[intra_row]\nwidth = \"90 mm\"\nshank_length = \"300 mm\"\nblade_height = \"2.5 mm\"\n\
-        servo_torque = \"40 kg cm\"\n[swing]\nservo_time_60 = \"0.2 s\"\nprotected = \"80 mm\"\nstem_off = \"20 mm\"\n\
-        room = \"15 mm\"\n";
+        servo_torque = \"40 kg cm\"\n[swing]\nservo_time_60 = \"0.2 s\"\npulse_for_90 = 800\nprotected = \"80 mm\"\n\
+        stem_off = \"20 mm\"\nroom = \"15 mm\"\n";
     fs::write(folder.path().join("my.toml"), machine).expect("there is room for a file");
     let design = said(folder.path(), &["design", "--machine", "my.toml"]);
     let lines: Vec<(&str, &str)> =
@@ -382,15 +389,49 @@ fn without_a_machine_s_file_its_measures_are_asked_and_nothing_else_is_offered()
     assert!(printed.contains("% of the row's ground weeded") && printed.contains("a tool of 90 mm"), "{printed}");
 }
 
+/// Runs `weeder set-up` on the virtual Uno with these lines. Returns its output.
+fn answered(folder: &Path, lines: &[&str]) -> String {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
+    command.current_dir(folder).args(["set-up", "--port", "./uno"]);
+    printed(&typed(&mut command, lines.join("\n") + "\n"), 0)
+}
+
 #[test]
-fn only_a_new_board_s_alarm_is_cleared_by_itself() {
+fn of_two_timings_by_eye_the_safest_times_are_set_and_one_that_is_left_out_does_not_count() {
+    let folder = TempDir::new().expect("there is room for a folder");
+    let (_uno, _) = uno(folder.path(), &["--stand", "--fast", "--link", "uno"]);
+    let to_step_6 = ["s", "s", "s", "s", "s", "off", ""];
+    let first = answered(folder.path(), &[&[""][..], &to_step_6, &["190", "50", "", "s", "s"]].concat());
+    assert!(first.contains("Open: step 6, Time the servo: time the servo: `calibrate servo` (1 of 2 done)"), "{first}");
+    let second = answered(folder.path(), &[&to_step_6[..], &["140", "80", "s"]].concat());
+    assert!(!second.contains("Open: step 6"), "{second}");
+    for line in ["    lead_out_ms 190 ms\n", "    lead_in_ms 50 ms\n"] {
+        assert!(second.contains(line), "{line:?} is not in\n{second}");
+    }
+}
+
+#[test]
+fn a_wheel_that_does_not_turn_is_named_and_the_wait_for_it_can_be_ended() {
+    let folder = TempDir::new().expect("there is room for a folder");
+    let (_uno, _) = uno(folder.path(), &["--stand", "--link", "uno"]);
+    let ended = answered(folder.path(), &["", "s", "s", "s", "s", "s", "s", "", "", "q"]);
+    for words in ["The machine has to roll farther: pos=0 speed_mm_s=0.", "Stopped. The same command continues here."] {
+        assert!(ended.contains(words), "{words:?} is not in\n{ended}");
+    }
+}
+
+#[test]
+fn only_a_board_without_settings_has_its_alarm_cleared_and_only_after_a_question() {
     let folder = TempDir::new().expect("there is room for a folder");
     let (_uno, _) = uno(folder.path(), &["--stand", "--no-reset", "--link", "uno"]);
+    let stopped = answered(folder.path(), &["q"]);
+    assert!(stopped.contains("alarm 5-1 settings_lost. If a file has them, type q."), "{stopped}");
     let mut monitor = Command::new(env!("CARGO_BIN_EXE_weeder"));
     monitor.current_dir(&folder).args(["monitor", "--plain", "--port", "./uno"]);
     // The switch is open, and the tool is out: a stuck tool.
-    let lines = "save\nclear\nset end_switch on\nset lead_out_ms 10\n";
-    typed(&mut monitor, lines);
+    let lines = "status\nsave\nclear\nset end_switch on\nset lead_out_ms 10\n";
+    let said = typed(&mut monitor, lines).stdout;
+    assert!(String::from_utf8_lossy(&said).contains("code=5-1"), "the alarm has stayed");
     let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
     command.current_dir(&folder).args(["set-up", "--port", "./uno"]);
     let output = typed(&mut command, String::new());
