@@ -148,7 +148,8 @@ test("a machine that is lost answers no command, and says why", async () => {
     await Promise.all([
         assert.rejects(
             dump,
-            (error) => error instanceof NoMachine && /the port is gone\. The machine may have done this/.test(error.message),
+            (error) =>
+                error instanceof NoMachine && /the port is gone\. The machine may have done this/.test(error.message),
         ),
         assert.rejects(start, new NoMachine("the machine is not there")),
     ]);

@@ -250,7 +250,7 @@ async function pressInAnyOrder(seed: number): Promise<string[]> {
                 },
                 (error: Error) => {
                     const isAnswered = error instanceof Refused;
-                    const isUnknown = error.message.includes("may still be done");
+                    const isUnknown = error.message.includes("may have done this");
                     ends[number] = isAnswered ? "answered" : isUnknown ? "unknown" : "not sent";
                 },
             );

@@ -193,7 +193,7 @@ fn play(stretch: &Stretch, pace: Pace, advance: &mut impl FnMut()) -> Result<Pla
                 let at = match event {
                     // A log may end behind any line.
                     EventLine::Swing { position, .. } if next.is_none() => Some(*position),
-                    _ => stretch.position_of_change(place),
+                    _ => stretch.position_of_change(place, player.settings()),
                 };
                 if let Some(at) = at {
                     player.roll_to(at, next);
@@ -258,6 +258,26 @@ mod tests {
         // If the same start was accepted, the tool swings into the row.
         let difference = start("ok").difference.expect("the log has no swing");
         assert!(difference.replayed.contains("swing tool=in"), "{difference}");
+    }
+
+    #[test]
+    fn work_that_begins_between_two_statuses_begins_where_the_ground_that_is_unseen_says() {
+        let happens = [
+            (1, Kind::Command, "set margin_mm 22"),
+            (1, Kind::Answer, "ok"),
+            (5, Kind::Event, "state is=work"),
+            (14, Kind::Event, "swing tool=in pos=1300"),
+        ];
+        let mut log = log(&happens);
+        // It began 30 mm behind the fifth status: X and the margin ahead are unseen there.
+        let statuses = log.iter_mut().filter(|entry| entry.kind == Kind::Status).enumerate().skip(6);
+        for (number, entry) in statuses {
+            let (before, _) = entry.text.split_once("unseen_mm").unwrap();
+            entry.text = format!("{before}unseen_mm={}", (422 + 30 + 250_usize).saturating_sub(50 * number));
+        }
+        let replayed = replay(&log).unwrap();
+        assert_eq!((replayed.difference, replayed.swings), (None, 1));
+        assert!(replayed.farthest_swing <= 4, "{} ticks", replayed.farthest_swing);
     }
 
     #[test]

@@ -13,7 +13,7 @@ use control::say::command::{Action, Command};
 use control::say::execute;
 use control::units::{Instant, Interval, Position, Ticks};
 use control::{measure::readings::Readings, operate::state::State};
-use link::settings::{Setting, steps};
+use link::settings::{Setting, Settings, steps};
 use link::{EventLine, Mode, Status};
 use rig::{Beams, Rig};
 
@@ -253,6 +253,11 @@ impl<'a> Player<'a> {
                 _ => {}
             }
         }
+    }
+
+    /// The settings in use.
+    pub(super) fn settings(&self) -> &Settings {
+        self.rig.settings()
     }
 
     /// Enters a state, unless it is there already. With `now` it works over unseen ground too, as `start now`.

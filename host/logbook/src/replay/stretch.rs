@@ -161,8 +161,8 @@ impl<'a> Stretch<'a> {
 
     /// The position of a state change that an event reports. An alarm has its own position. Else the next swing has it.
     /// Without a swing the tool was already out: work then began as late, and ended as early, as the log allows. Or the
-    /// log ends before the swing, which then came at its end.
-    pub(super) fn position_of_change(&self, place: usize) -> Option<i32> {
+    /// log ends before the swing, which then came at its end. `settings` are those of the moment.
+    pub(super) fn position_of_change(&self, place: usize, settings: &Settings) -> Option<i32> {
         let mode = match self.happened[place].1 {
             Happened::Event(EventLine::Alarm { position, .. }) => return Some(position),
             Happened::Event(EventLine::State { mode }) => mode,
@@ -177,10 +177,10 @@ impl<'a> Stretch<'a> {
             }
             // Work began on unseen ground, from the tool to the beam and a margin ahead. The machine has left some of it since.
             let [to_beam_mm, margin_mm] =
-                [Setting::BeamToToolMm, Setting::MarginMm].map(|setting| i32::from(self.settings.get(setting)));
+                [Setting::BeamToToolMm, Setting::MarginMm].map(|setting| i32::from(settings.get(setting)));
             let left_mm = u16::try_from(to_beam_mm + margin_mm - next.unseen_mm).unwrap_or(0);
             let most = next.position.wrapping_sub(before()?).max(0);
-            Some(next.position.wrapping_sub(self.settings.wheel().ticks(left_mm).0.min(most)))
+            Some(next.position.wrapping_sub(settings.wheel().ticks(left_mm).0.min(most)))
         };
         // At most one status comes between the change and its swing.
         let is_cut = || self.happened[place..].iter().filter_map(status).nth(1).is_none() && !self.was_out(place);
