@@ -2,14 +2,13 @@
 //!
 //! - [`state`], [`lamp`]: HOLD, WORK or alarm, and the LED that shows it.
 //! - [`configuration`], [`saved`], [`limits`]: the settings, their EEPROM copies, and limits calculated from them.
-//! - [`mod@bench`], [`calibration`], [`dry_run`], [`example_entry`]: manual tests, and entering examples.
+//! - [`manual_test`], [`calibration`], [`dry_run`], [`example_entry`]: manual tests, and entering examples.
 //! - [`tool`], [`servo`]: the tool's commands, and the servo's pulse.
 //! - [`plant_timeout`], [`unknown_run`]: signs that the machine has left its crop.
 //! - [`event`], [`plot`], [`detections`]: output that waits for the console.
 //!
 //! Each module keeps its own data; [`weeder`](crate::weeder) connects them.
 
-pub mod bench;
 pub mod calibration;
 pub mod command_error;
 pub mod configuration;
@@ -19,6 +18,7 @@ pub mod event;
 pub mod example_entry;
 pub mod lamp;
 pub mod limits;
+pub mod manual_test;
 pub mod plant_timeout;
 pub mod plot;
 pub mod saved;

@@ -6,7 +6,7 @@
 //! line, or runs a command. No input can stop the loop.
 //!
 //! All texts are in flash ([`packed`]), with the names of alarms and settings. No module outside imports this one. Inside it,
-//! imports run `words` -> `texts` -> [`packed`] -> [`names`] -> [`command`], [`line`] -> the modules that build lines -> `answer`
+//! imports run `words` -> `texts` -> [`packed`] -> [`names`] -> [`command`], `line` -> the modules that build lines -> `answer`
 //! -> `execute` -> this file.
 
 mod answer;

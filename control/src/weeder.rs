@@ -4,9 +4,9 @@
 //! the ground. It then asks the ground whether the tool may be in the row. No call waits. No call stores a time for a later action:
 //! each turn decides from the position and the speed of that turn.
 
-mod bench;
 mod commands;
 mod faults;
+mod manual_tests;
 mod shown;
 
 use crate::{
@@ -27,13 +27,13 @@ use crate::{
     },
     memory::Memory,
     operate::{
-        bench::Bench,
         calibration::Distance,
         configuration::Configuration,
         detections::{Classified, Detections},
         event::{Event, Events},
         example_entry::ExampleEntry,
         limits::Limits,
+        manual_test::ManualTest,
         plant_timeout::PlantTimeout,
         plot::Telemetry,
         servo::{self, HalfMicros},
@@ -67,7 +67,7 @@ pub struct Controller<C, M> {
     /// Whether the reset ended work that the operator has not started again or left.
     was_working: bool,
     sensors: Sensors,
-    bench: Bench,
+    manual_test: ManualTest,
     distance: Distance,
     state: State,
     tool: Tool,
@@ -103,7 +103,7 @@ impl<C: Classifier, M: Memory> Uninit<C, M> {
             cause: Cause::PowerOn,
             was_working: false,
             sensors: Sensors::NONE,
-            bench: Bench::Idle,
+            manual_test: ManualTest::Idle,
             distance: Distance::NONE,
             state: State::Hold,
             tool: Tool::NONE,
@@ -302,7 +302,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn pulse(&self) -> HalfMicros {
         let setting = if self.tool.is_out() { Setting::ServoOutUs } else { Setting::ServoInUs };
-        self.bench.pulse().unwrap_or_else(|| servo::from_us(self.configuration.get(setting)))
+        self.manual_test.pulse().unwrap_or_else(|| servo::from_us(self.configuration.get(setting)))
     }
 
     /// Whether the ground or a silent encoder keeps the tool out of the row.
@@ -385,7 +385,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// sensor, or another alarm is latched.
     fn forget_and_raise(&mut self, alarm: Alarm) {
         self.ground.forget();
-        let is_ignored = alarm.is_of_a_sensor() && self.bench.needs_no_sensor();
+        let is_ignored = alarm.is_of_a_sensor() && self.manual_test.needs_no_sensor();
         if is_ignored || matches!(self.state, State::Alarm(_)) {
             return;
         }
@@ -405,7 +405,6 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Forgets the ground before work begins. In HOLD the machine may have been turned, lifted or reversed to another row, and nothing
     /// tells. Ground behind the frontier would count as known, and its plants would not be seen.
-    #[inline(never)]
     pub(super) fn begin_ground(&mut self) {
         if !self.is_working() {
             self.ground.begin(self.sensors.position, self.sensors.beam_broken);
@@ -424,7 +423,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     fn enter(&mut self, state: State) {
         // `hold` and the switch also end a manual test.
-        (self.bench, self.was_working) = (Bench::Idle, false);
+        (self.manual_test, self.was_working) = (ManualTest::Idle, false);
         self.tool.forget_swings();
         if state != self.state {
             self.state = state;

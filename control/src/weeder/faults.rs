@@ -6,7 +6,7 @@ use crate::{
     ground::class::{Class, Classifier},
     measure::sensors::Sensors,
     memory::Memory,
-    operate::{bench::Bench, event::Event},
+    operate::{event::Event, manual_test::ManualTest},
     settings::Setting,
     units::Length,
 };
@@ -34,7 +34,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             self.sensors.encoder.read(now, position, doubted, self.ground.geometry().scale.ticks(PROGRESS).0 as u8);
         if !self.sensors.encoder.stands() {
             // Movement ends a manual test, with the tool out.
-            self.bench = Bench::Idle;
+            self.manual_test = ManualTest::Idle;
         }
         if self.sensors.encoder.is_silent() {
             // The distance since then is unknown.
@@ -73,7 +73,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Whether there is an end switch that the tool must follow.
     fn has_end_switch(&self) -> bool {
-        self.configuration.get(Setting::EndSwitch) != 0 && !self.bench.needs_no_end_switch()
+        self.configuration.get(Setting::EndSwitch) != 0 && !self.manual_test.needs_no_end_switch()
     }
 
     /// A swing ends. Counts those out that the end switch has not followed: at speed they may be too short for the alarm while they

@@ -83,16 +83,16 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Whether the status LED is lit. During a servo test it shows the commands. While the servo is driven directly it is lit, as at
     /// work: the tool may be in the row.
     pub fn lamp_is_lit(&self) -> bool {
-        if self.bench.swings() {
+        if self.manual_test.swings() {
             self.tool.is_out()
         } else {
-            self.bench.pulse().is_some() || lamp::is_lit(self.state, self.sensors.readings.now)
+            self.manual_test.pulse().is_some() || lamp::is_lit(self.state, self.sensors.readings.now)
         }
     }
 
     /// Whether the tool is commanded out of the row. While the servo is driven directly, the tool may be anywhere, so it is not.
     pub fn tool_out(&self) -> bool {
-        self.tool.is_out() && self.bench.pulse().is_none()
+        self.tool.is_out() && self.manual_test.pulse().is_none()
     }
 
     /// The machine's position: the encoder's count without the ticks that noise added.

@@ -15,7 +15,7 @@ use crate::{
 #[derive(Clone, Debug)]
 // `Idle` is 0, like memory before start-up.
 #[repr(u8)]
-pub enum Bench {
+pub enum ManualTest {
     /// None.
     Idle,
     /// The servo is driven directly with this pulse.
@@ -26,7 +26,7 @@ pub enum Bench {
     Row(DryRun),
 }
 
-impl Bench {
+impl ManualTest {
     /// The pulse that the operator drives the servo with.
     pub const fn pulse(&self) -> Option<HalfMicros> {
         if let Self::ByHand(pulse) = self { Some(*pulse) } else { None }

@@ -6,11 +6,11 @@ use crate::{
     measure::readings::Readings,
     memory::Memory,
     operate::{
-        bench::Bench,
         calibration::{Outcome, SwingTimes, Swings},
         command_error::CommandError,
         dry_run::DryRun,
         event::Event,
+        manual_test::ManualTest,
         servo,
         state::State,
     },
@@ -29,7 +29,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if !Setting::ServoOutUs.allows(pulse_us) {
             return Err(CommandError::OutOfRange);
         }
-        self.bench = Bench::ByHand(servo::from_us(pulse_us));
+        self.manual_test = ManualTest::ByHand(servo::from_us(pulse_us));
         Ok(())
     }
 
@@ -47,7 +47,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// [`CommandError::NotInHold`] and [`CommandError::AlarmLatched`].
     pub fn servo_out(&mut self) -> Result<(), CommandError> {
         self.expect_hold()?;
-        self.bench = Bench::Idle;
+        self.manual_test = ManualTest::Idle;
         Ok(())
     }
 
@@ -59,7 +59,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.expect_rest()?;
         let watched = self.configuration.get(Setting::EndSwitch) != 0;
         let gap_ms = self.configuration.get(Setting::ServoGapMs);
-        self.bench = Bench::Swings(Swings::new(self.sensors.readings.now, watched, gap_ms as u8));
+        self.manual_test = ManualTest::Swings(Swings::new(self.sensors.readings.now, watched, gap_ms as u8));
         Ok(())
     }
 
@@ -97,7 +97,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if !(Setting::TopSpeedMmS.least()..=fastest).contains(&speed_mm_s) {
             return Err(CommandError::TestSpeed);
         }
-        self.bench = Bench::Row(DryRun::new(self.sensors.readings.now, speed_mm_s, self.configuration.settings()));
+        self.manual_test =
+            ManualTest::Row(DryRun::new(self.sensors.readings.now, speed_mm_s, self.configuration.settings()));
         Ok(())
     }
 
@@ -107,7 +108,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// [`CommandError::NotInHold`], [`CommandError::AlarmLatched`] and [`CommandError::Rolls`].
     pub fn test_watchdog(&mut self) -> Result<(), CommandError> {
         self.expect_rest()?;
-        (self.bench, self.tests_watchdog) = (Bench::Idle, true);
+        (self.manual_test, self.tests_watchdog) = (ManualTest::Idle, true);
         Ok(())
     }
 
@@ -119,7 +120,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Runs one step of the manual test. Returns whether the tool is to be out; `None` if the test does not decide that.
     pub(super) fn try_out(&mut self) -> Option<bool> {
         let Readings { now, end_switch_on, .. } = self.sensors.readings;
-        let (out, outcome) = self.bench.carry_on(now, end_switch_on, self.tool.is_out());
+        let (out, outcome) = self.manual_test.carry_on(now, end_switch_on, self.tool.is_out());
         if let Some(outcome) = outcome {
             self.finish_swings(outcome);
         }
