@@ -41,7 +41,7 @@ fn every_command_is_answered_by_one_ok_or_error() {
 }
 
 #[test]
-fn a_list_is_answered_by_all_its_lines() {
+fn a_command_is_answered_by_all_its_lines_and_ok() {
     let mut uno = started();
     for (command, lines) in [
         ("help", Word::COUNT),
@@ -50,6 +50,15 @@ fn a_list_is_answered_by_all_its_lines() {
         ("status", 2),
         ("get", Setting::COUNT),
         ("get wheel_mm", 1),
+        ("set wheel_mm 405", 0),
+        ("start", 0),
+        ("hold", 0),
+        ("start now", 0),
+        ("hold", 0),
+        ("save", 0),
+        ("clear", 0),
+        ("events on", 0),
+        ("events off", 0),
         ("  set \t wheel_mm   400  ", 0),
     ] {
         assert_answer(&mut uno, command, lines);

@@ -284,6 +284,9 @@ impl Line<'_> {
         };
         value.ok_or_else(|| {
             let hint = match unclear {
+                Some((',', _)) if commas_separate => {
+                    "; its comma may be one of thousands: leave it out, or write a point"
+                }
                 Some((',', _)) => "; its comma may be one of thousands: leave it out, or write four decimals",
                 Some(_) => "; its point may be one of thousands: leave it out, or write four decimals",
                 None if commas_separate && with_point(text) != text => {

@@ -145,7 +145,7 @@ pub(crate) fn check(words: &ArgMatches) -> Result<(), String> {
     let mut taken: Vec<PathBuf> = inputs.into_iter().map(full).collect();
     for output in outputs {
         let full = full(output);
-        let is_device = full.metadata().is_ok_and(|there| !there.is_file());
+        let is_device = full.metadata().is_ok_and(|there| !there.is_file() && !there.is_dir());
         if !is_device && taken.contains(&full) {
             return Err(format!("{} has two uses in this command: name another output", output.display()));
         }

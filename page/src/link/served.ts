@@ -103,6 +103,7 @@ export class Served {
 
     /** Holds all machines, before all waiting commands. */
     async holdAll(): Promise<HeldAll> {
+        if (this.machines.some(({ isOther }) => isOther)) throw new Error(english("servedOther"));
         const { isOk, text } = await send("/machines/hold", LONG_MS, { method: "POST" });
         if (!isOk) throw new Error(text);
         return JSON.parse(text) as HeldAll;
@@ -135,8 +136,10 @@ export class Served {
         // A new start of `weeder serve` has another code, so it answers with the form. It may have other machines.
         const isOther = answer?.status === 401 || (answer?.isOk && answer.text !== this.text);
         // Some browsers would not ask before they drop a log.
-        if (isOther && !this.mayReload()) this.#tellLost(english("servedOther"));
-        else if (isOther) location.reload();
+        if (isOther && !this.mayReload()) {
+            for (const machine of this.machines) machine.isOther = true;
+            this.#tellLost(english("servedOther"));
+        } else if (isOther) location.reload();
         else if (answer?.isOk) this.listen();
         else setTimeout(() => void this.#again(), RETRY_MS);
     }
@@ -147,6 +150,8 @@ export class ServedMachine implements Link {
     onHappening: (happening: Happening) => void = () => {};
     /** Gets the reason if the machine was absent and still is. */
     onAbsent: (why: string) => void = () => {};
+    /** Whether the computer may have another machine by this number now. */
+    isOther = false;
     /** While it is connected: ends pending requests, with the reason. */
     #there: AbortController | undefined;
     /** Resolves when earlier commands are answered. A browser has few connections, and HOLD needs one at once. */
@@ -177,6 +182,7 @@ export class ServedMachine implements Link {
     /** Goes out at once, also if the machine seems to be lost. */
     async hold(): Promise<void> {
         this.#holds++;
+        if (this.isOther) throw new NoMachine(english("servedOther"));
         await this.#type("hold", SHORT_MS);
     }
 

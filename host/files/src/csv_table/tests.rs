@@ -112,7 +112,7 @@ fn a_comma_or_point_that_may_be_one_of_thousands_is_refused_unless_another_numbe
     for (text, wrong) in [
         ("place_mm\tcount\n750\t1\n1,250\t2", "line 3: place_mm is `1,250`: it has to be a number; its comma"),
         ("place_mm;count\n0.5;1,000", "line 2: count is `1,000`: it has to be a whole number; its comma may be"),
-        ("place_mm,count\n\"-1,250\",1", "; its comma may be one of thousands: leave it out, or write four decimals"),
+        ("place_mm,count\n\"-1,250\",1", "; its comma may be one of thousands: leave it out, or write a point"),
         ("place_mm;count\n0,4;1.000", "line 2: count is `1.000`: it has to be a whole number; its point may be one"),
         ("place_mm\tcount\n1.200\t1", "line 2: place_mm is `1.200`: it has to be a number; its point may be one"),
         ("place_mm;count\n0,4;1\n0.5;1\n1,250;1", "line 4: place_mm is `1,250`: it has to be a number; its comma"),

@@ -38,7 +38,12 @@ pub struct Recorded {
 /// # Errors
 /// Names the file, the line and what would be right.
 pub fn read(path: &Path) -> Result<Vec<Recorded>, FileError> {
-    detections(&CsvTable::read(path, &COLUMNS)?).map(object).collect()
+    let read: Vec<_> = detections(&CsvTable::read(path, &COLUMNS)?).map(object).collect::<Result<_, _>>()?;
+    if read.is_empty() {
+        let problem = "no line is below the header: add at least one".to_owned();
+        return Err(FileError::Line { path: path.into(), line: 1, problem });
+    }
+    Ok(read)
 }
 
 /// Reads detections as [`read`], or none.
@@ -102,7 +107,7 @@ pub fn read_labelled(paths: &[PathBuf]) -> Result<ToLearn, FileError> {
 
 /// The lines of a table, without the headers of further dumps.
 fn detections(table: &CsvTable) -> impl Iterator<Item = Line<'_>> {
-    table.lines().filter(|line| line.text(COLUMNS[0]) != COLUMNS[0])
+    table.lines().filter(|line| COLUMNS.iter().any(|&column| line.text(column) != column))
 }
 
 /// The object in a line.
