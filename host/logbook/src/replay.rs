@@ -213,7 +213,7 @@ fn play(stretch: &Stretch, pace: Pace, advance: &mut impl FnMut()) -> Result<Pla
                     starts_now |= command.action == Action::StartNow;
                     continue;
                 }
-                if let Some(at) = stretch.position_of_command((player.position(), last_ms), place) {
+                if let Some(at) = stretch.position_of_command((player.position(), last_ms), place, player.settings()) {
                     player.roll_to(at, stretch.next_status(place));
                     last_ms = entry.time_ms;
                 }

@@ -145,8 +145,14 @@ impl<'a> Stretch<'a> {
     }
 
     /// The machine's position at a typed command that changes no state: between its last position, with that time, and
-    /// the next status, by the PC's clock. `start now` at work lets the tool into the row at its next swing in.
-    pub(super) fn position_of_command(&self, last: (i32, u64), place: usize) -> Option<i32> {
+    /// the next status, by the PC's clock. `start now` at work lets the tool into the row at its next swing in. `start` has the
+    /// position at which work begins, with these `settings`.
+    pub(super) fn position_of_command(&self, last: (i32, u64), place: usize, settings: &Settings) -> Option<i32> {
+        if let (_, Happened::Command(Some(Command { action: Action::Start, .. }))) = self.happened[place]
+            && let Some(begin) = self.begin_of_work(place, Some(last.0), settings)
+        {
+            return Some(begin);
+        }
         if let (_, Happened::Command(Some(Command { action: Action::StartNow, .. }))) = self.happened[place]
             && let Some((position, true)) = self.happened[place..].iter().find_map(swing_or_status)
         {
@@ -171,24 +177,33 @@ impl<'a> Stretch<'a> {
         let before = || self.happened[..place].iter().rev().find_map(swing_or_status).map(|(position, _)| position);
         let next_status = || {
             let mut until_next = self.happened[place + 1..].iter().take_while(|happened| !is_change(happened));
-            let next = until_next.find_map(status)?;
-            if mode != Mode::Work || next.unseen_mm <= 0 {
-                return Some(next.position);
-            }
-            // Work began on unseen ground, from the tool to the beam and a margin ahead. The machine has left some of it since.
-            let [to_beam_mm, margin_mm] =
-                [Setting::BeamToToolMm, Setting::MarginMm].map(|setting| i32::from(settings.get(setting)));
-            let left_mm = u16::try_from(to_beam_mm + margin_mm - next.unseen_mm).unwrap_or(0);
-            let most = next.position.wrapping_sub(before()?).max(0);
-            Some(next.position.wrapping_sub(settings.wheel().ticks(left_mm).0.min(most)))
+            Some(until_next.find_map(status)?.position)
         };
         // At most one status comes between the change and its swing.
         let is_cut = || self.happened[place..].iter().filter_map(status).nth(1).is_none() && !self.was_out(place);
         match self.swing_of_change(place) {
             Some((_, position)) => Some(position),
-            None if mode == Mode::Work || is_cut() => next_status().or_else(before),
+            None if mode == Mode::Work => {
+                self.begin_of_work(place, before(), settings).or_else(next_status).or_else(before)
+            }
+            None if is_cut() => next_status().or_else(before),
             None => before(),
         }
+    }
+
+    /// Where work began after a position. It begins on unseen ground, from the tool to the beam and a margin ahead, and the next
+    /// status says how much of that is left. `None` if the log does not tell.
+    fn begin_of_work(&self, place: usize, before: Option<i32>, settings: &Settings) -> Option<i32> {
+        let ends = |happened: &Happened| {
+            matches!(happened, Happened::Event(EventLine::Alarm { .. } | EventLine::State { mode: Mode::Work }))
+        };
+        let mut until_next = self.happened[place + 1..].iter().take_while(|(_, happened)| !ends(happened));
+        let next = until_next.find_map(status).filter(|next| next.unseen_mm > 0)?;
+        let [to_beam_mm, margin_mm] =
+            [Setting::BeamToToolMm, Setting::MarginMm].map(|setting| i32::from(settings.get(setting)));
+        let left_mm = u16::try_from(to_beam_mm + margin_mm - next.unseen_mm).unwrap_or(0);
+        let most = next.position.wrapping_sub(before?).max(0);
+        Some(next.position.wrapping_sub(settings.wheel().ticks(left_mm).0.min(most)))
     }
 
     /// The index and the position of the swing that a change of state brings. A status that was asked for before may come
