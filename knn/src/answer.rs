@@ -6,11 +6,11 @@ pub const MAX_K: u8 = 15;
 /// How reliable an answer is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Kind {
-    /// One class has more votes than any other, and the nearest example is within the radius.
+    /// One class has more votes than any other, and its nearest example is within the radius.
     Known,
-    /// Two or more classes share the most votes; the nearest example is within the radius.
+    /// Two or more classes share the most votes; the nearest example of the one that is named is within the radius.
     Tie,
-    /// The nearest example is farther than the radius: no example is similar.
+    /// The nearest example of the named class is farther than the radius: none of that class is similar.
     Stranger,
 }
 
@@ -22,7 +22,7 @@ pub struct Answer<const CLASSES: usize> {
     pub label: u8,
     /// The votes of each class: k in all.
     pub votes: [u8; CLASSES],
-    /// The squared distance to the nearest example (see [`squared_distance`](crate::squared_distance)).
+    /// The squared distance to the nearest example of that class (see [`squared_distance`](crate::squared_distance)).
     pub nearest: u32,
     /// How reliable the answer is.
     pub kind: Kind,

@@ -7,8 +7,9 @@ use crate::{Answer, ClassifyError, Examples, MAX_K, Nearest, Neighbour};
 /// - Of examples at the same distance, those with the greater label are nearer. So the order of the examples never matters. Give the
 ///   class that is the costlier to miss the greater label.
 /// - Each vote counts one, near or far; the class with the most votes wins (see [`Answer::label`] for ties).
-/// - `radius` is a squared distance: if the nearest example is farther, the answer is a [`Kind::Stranger`](crate::Kind::Stranger)
-///   with any votes. `u32::MAX` turns this off.
+/// - `radius` is a squared distance: if the nearest example of the winning class is farther, the answer is a
+///   [`Kind::Stranger`](crate::Kind::Stranger) with any votes. So far examples that outvote a similar one are not believed.
+///   `u32::MAX` turns this off.
 ///
 /// ```
 /// use knn::{Answer, Example, Kind, classify};

@@ -118,7 +118,8 @@ impl<const CLASSES: usize> Nearest<CLASSES> {
                 (label, most) = (place.label(), *votes);
             }
         }
-        let nearest = nearest.distance();
+        // Never none: the class has votes.
+        let nearest = places.iter().rfind(|place| place.label() == label).unwrap_or(nearest).distance();
         let kind = match (nearest > radius, is_tie) {
             (true, _) => Kind::Stranger,
             (false, true) => Kind::Tie,

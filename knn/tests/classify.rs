@@ -41,14 +41,15 @@ fn reference<const FEATURES: usize, const CLASSES: usize>(
     let most = votes.into_iter().max().expect("there are classes");
     let leads = |label: u8| votes[usize::from(label)] == most;
     let label = voters.iter().map(|&(_, label)| label).find(|&label| leads(label)).expect("a class leads");
-    let kind = if voters[0].0 > f64::from(radius) {
+    let nearest = voters.iter().find(|voter| voter.1 == label).expect("it has votes").0;
+    let kind = if nearest > f64::from(radius) {
         Kind::Stranger
     } else if votes.into_iter().filter(|&votes| votes == most).count() > 1 {
         Kind::Tie
     } else {
         Kind::Known
     };
-    Ok(Answer { label, votes, nearest: voters[0].0 as u32, kind })
+    Ok(Answer { label, votes, nearest: nearest as u32, kind })
 }
 
 fn float_distance<const FEATURES: usize>(example: &Example<FEATURES>, query: &[u8; FEATURES]) -> f64 {

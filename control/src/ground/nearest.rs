@@ -2,7 +2,8 @@
 //!
 //! Examples are feature vectors in bytes, scaled by [`examples::scale`]. They are searched in flash and in the EEPROM, some in each
 //! turn, with the crate `knn`. Three cases give [`Class::Unknown`], which counts as a plant: a tie, a detection far from all
-//! examples, and fewer than k examples. Of a plant and a weed at the same distance, the plant is nearer.
+//! examples of the class with the most votes, and fewer than k examples. Of a plant and a weed at the same distance, the plant is
+//! nearer.
 
 use crate::{
     ground::{
@@ -87,14 +88,16 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Nearest<B, M> {
     fn vote(&self) -> Vote {
         let found: &Found<[Neighbour]> = &self.found;
         let voters = found.places();
-        let ([farthest, ..], [.., nearest]) = (voters, voters) else { return Vote::UNKNOWN };
-        if *farthest == Neighbour::NONE {
+        if voters.first().is_none_or(|farthest| *farthest == Neighbour::NONE) {
             return Vote::UNKNOWN;
         }
         let plants: u8 = voters.iter().map(|example| example.label()).sum();
         let weeds = voters.len() as u8 - plants;
-        let (class, votes) = if plants > weeds { (Class::Plant, plants) } else { (Class::Weed, weeds) };
-        let is_known = plants != weeds && nearest.distance() <= examples::RADIUS;
+        let (class, label, votes) =
+            if plants > weeds { (Class::Plant, label::PLANT, plants) } else { (Class::Weed, label::WEED, weeds) };
+        // Far weeds that outvote a plant at hand, which was just taught, are not believed.
+        let beyond = const { Neighbour::new(examples::RADIUS + 1, u8::MAX) };
+        let is_known = plants != weeds && voters.iter().any(|voter| voter.label() == label && *voter < beyond);
         Vote { class: if is_known { class } else { Class::Unknown }, votes }
     }
 }
@@ -220,6 +223,29 @@ mod tests {
         assert_eq!(listed.len(), examples::CAPACITY + usize::from(field_examples::CAPACITY));
         // All are at the same distance, and the plants are nearer.
         assert_eq!(nearest.classify(&features, 3), Vote { class: Class::Plant, votes: 3 });
+    }
+
+    #[test]
+    fn a_detection_that_was_unknown_is_no_weed_after_its_label_plant() {
+        let mut unknown = 0;
+        for (speed_mm_s, width_mm) in
+            features::SPEED_CLASSES_MM_S.iter().flat_map(|speed| (20..100).map(|mm| (*speed, mm)))
+        {
+            let features = Features::describe(speed_mm_s, 500, width_mm);
+            for k in 1..=MAX_K {
+                let mut nearest = Nearest::new(examples::EXAMPLES, Volatile::new());
+                if nearest.classify(&features, k).class == Class::Unknown {
+                    unknown += 1;
+                    assert_eq!(nearest.teach(&features, label::PLANT), Ok(()));
+                    while !nearest.carry_on() {}
+                    assert!(nearest.begin(&features, k).is_none());
+                    let stepped = core::iter::repeat_with(|| nearest.go_on()).flatten().next();
+                    assert_eq!(stepped, Some(nearest.classify(&features, k)), "{width_mm} mm, k {k}");
+                    assert_ne!(nearest.classify(&features, k).class, Class::Weed, "{width_mm} mm, k {k}");
+                }
+            }
+        }
+        assert!(unknown > 500, "{unknown}");
     }
 
     #[test]
