@@ -224,7 +224,7 @@ fn the_tool_is_in_the_row_if_nothing_keeps_it_out() {
 }
 
 #[test]
-fn work_begins_on_ground_that_the_beam_has_yet_to_see_unless_the_operator_keeps_it() {
+fn work_begins_on_ground_that_the_beam_has_yet_to_see() {
     for by in ["start", "switch", "start now"] {
         let mut rolling = Rolling::along(Vec::new(), Vec::new(), &[]);
         rolling.roll_to(2000.0, 500.0);
@@ -243,13 +243,25 @@ fn work_begins_on_ground_that_the_beam_has_yet_to_see_unless_the_operator_keeps_
             _ => rolling.machine.start(by == "start now").unwrap(),
         }
         (0..200).for_each(|_| rolling.turn(0.0));
-        assert_eq!(rolling.machine.tool_out(), by != "start now", "{by}");
-        if by != "start now" {
-            rolling.roll_to(4500.0, 500.0);
-            // The command to come back leads.
-            let zone_mm = plant_mm.0 - MARGIN_MM..plant_mm.1 + MARGIN_MM - 25.0;
-            let harm_mm = rolling.weeded_mm.iter().find(|mm| **mm < 2500.0 || zone_mm.contains(mm));
-            assert!(harm_mm.is_none() && !rolling.weeded_mm.is_empty(), "{by}: {harm_mm:?}");
-        }
+        assert!(rolling.machine.tool_out(), "{by}");
+        rolling.roll_to(4500.0, 500.0);
+        // The command to come back leads.
+        let zone_mm = plant_mm.0 - MARGIN_MM..plant_mm.1 + MARGIN_MM - 25.0;
+        let harm_mm = rolling.weeded_mm.iter().find(|mm| **mm < 2500.0 || zone_mm.contains(mm));
+        assert!(harm_mm.is_none() && !rolling.weeded_mm.is_empty(), "{by}: {harm_mm:?}");
+    }
+}
+
+#[test]
+fn start_now_keeps_the_known_ground_after_a_jolt_back_but_not_after_rolling_back() {
+    // Up to the margin, and beyond.
+    for (back_mm, keeps) in [(0.0, true), (40.0, true), (70.0, false), (3000.0, false)] {
+        let mut rolling = Rolling::along(Vec::new(), Vec::new(), &[]);
+        rolling.roll_to(6000.0, 500.0);
+        rolling.machine.hold();
+        rolling.roll_to(6000.0 - back_mm, 500.0);
+        rolling.machine.start(true).unwrap();
+        rolling.roll_to(6010.0 - back_mm, 500.0);
+        assert_eq!(rolling.machine.tool_out(), !keeps, "{back_mm} mm");
     }
 }

@@ -124,7 +124,6 @@ fn shunting_with_the_beam_in_a_plant_makes_one_plant_of_it() {
 
 #[test]
 fn after_a_turn_with_reversing_a_plant_of_the_next_row_is_kept() {
-    let row = Row::new(vec![Canopy::plant(1300.0, 150.0)]).expect("a plant is a row");
     let motion = Motion::starting_at(0.0)
         .change_speed(mm_s(2.0), 1000.0)
         .stop_at(1900.0, 1000.0)
@@ -136,20 +135,23 @@ fn after_a_turn_with_reversing_a_plant_of_the_next_row_is_kept() {
         .roll_to(2600.0);
     let passing = |place_mm, number| motion.passings(place_mm).nth(number).expect("the machine comes there").time_s;
     let (hold_s, turn_s, start_s) = (passing(1000.0, 0), passing(1890.0, 1), passing(905.0, 1) + 0.7);
-    let pass = Pass { start: Start::Now, ..pass(row, motion) };
-    // Before the turn the beam passes bare ground.
-    let mut run = Run::begin_altered(pass, &[], |start, mut changes| {
-        changes.retain(|change| change.pin != wiring::BEAM || change.cycle > cycle_at(start, turn_s));
-        changes
-    });
-    for (time_s, line) in [(hold_s, &b"hold\n"[..]), (start_s, b"start\n")] {
-        run.uno.run_until(cycle_at(run.cycles().start, time_s)).expect("the firmware runs");
-        run.uno.send(line);
+    for start in [&b"start\n"[..], b"start now\n"] {
+        let row = Row::new(vec![Canopy::plant(1300.0, 150.0)]).expect("a plant is a row");
+        let pass = Pass { start: Start::Now, ..pass(row, motion.clone()) };
+        // Before the turn the beam passes bare ground.
+        let mut run = Run::begin_altered(pass, &[], |start, mut changes| {
+            changes.retain(|change| change.pin != wiring::BEAM || change.cycle > cycle_at(start, turn_s));
+            changes
+        });
+        for (time_s, line) in [(hold_s, &b"hold\n"[..]), (start_s, start)] {
+            run.uno.run_until(cycle_at(run.cycles().start, time_s)).expect("the firmware runs");
+            run.uno.send(line);
+        }
+        run.roll_to_the_end();
+        let judgement = run.judgement();
+        assert_ne!(judgement.plants[0].verdict, Verdict::Damaged, "{:?}", judgement.plants);
+        let start = cycle_at(run.cycles().start, start_s);
+        let commands = run.commands();
+        assert!(commands.iter().any(|command| command.rise_cycle > start && !command.is_out), "it weeds the next row");
     }
-    run.roll_to_the_end();
-    let judgement = run.judgement();
-    assert_ne!(judgement.plants[0].verdict, Verdict::Damaged, "{:?}", judgement.plants);
-    let start = cycle_at(run.cycles().start, start_s);
-    let commands = run.commands();
-    assert!(commands.iter().any(|command| command.rise_cycle > start && !command.is_out), "it weeds the next row");
 }

@@ -88,6 +88,11 @@ impl Ground {
         self.keep_out.open_from(self.geometry.margin()) - (self.tool() + distance)
     }
 
+    /// Whether the beam has rolled back by more than the margin. Up to the frontier it sees no edge.
+    pub fn has_rolled_back(&self) -> bool {
+        self.detector.frontier() - self.beam > self.geometry.margin()
+    }
+
     /// The operator confirms that no plant stands on the unknown ground at the tool and ahead of it. Does nothing on known ground,
     /// as [`unseen`](Self::unseen) tells it.
     pub fn assume_bare(&mut self) {

@@ -12,7 +12,8 @@ use knn::Example;
 
 impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Goes to work, on ground that the beam has yet to see. With `now`, the tool may enter at once: ground seen before stays known,
-    /// and other ground counts as bare.
+    /// and other ground counts as bare. Not after the machine has rolled back: there the beam would miss plants of another row, and the
+    /// machine may have dropped plants of this one.
     ///
     /// # Errors
     /// [`CommandError::AlarmLatched`], and a [`Contradiction`](crate::settings::Contradiction) between settings.
@@ -24,7 +25,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if self.configuration.has_changed() {
             self.follow_settings();
         }
-        if now {
+        if now && !self.ground.has_rolled_back() {
             self.ground.assume_bare();
         } else {
             self.begin_ground();

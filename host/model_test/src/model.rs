@@ -129,6 +129,13 @@ impl Model {
         self.slack += ticks;
     }
 
+    /// Whether the beam, at a position, has rolled back by more than `distance`. Within `tolerance`, the machine may say otherwise.
+    pub fn has_rolled_back(&mut self, place: i64, distance: i64, tolerance: i64) -> bool {
+        let beyond = self.frontier - place - distance;
+        self.may_have_forgotten |= beyond.abs() <= self.slack + tolerance;
+        beyond > 0
+    }
+
     /// The ground ahead of a position is seen again as new.
     pub fn see_again(&mut self, place: i64) {
         self.known_from = self.known_from.min(place);

@@ -66,11 +66,7 @@ impl<M: Machine> Drive<M> {
             self.begin(&line, before);
             if M::IS_OPEN {
                 self.check_begun(&line, before)?;
-                let works = self.machine.state() == State::Work;
-                self.expectations.follow_work(works, words(&line) == ["start", "now"], self.here());
-                if works {
-                    self.trust(&line, unseen_mm);
-                }
+                self.follow_start(&line, self.machine.state() == State::Work, unseen_mm);
             }
             self.console.current = line;
         }
@@ -128,24 +124,29 @@ impl<M: Machine> Drive<M> {
         if !M::IS_OPEN && is_ok {
             *is_tried &= !matches!(words[..], ["hold"] | ["servo", "out"] | ["start", ..]);
             match words[..] {
-                ["start", ..] => self.expectations.follow_work(true, words.len() > 1, self.here()),
+                ["start", ..] => self.follow_start(&line, true, unseen_mm),
                 ["hold" | "clear"] => self.expectations.works = false,
                 _ => {}
             }
-            self.trust(&line, unseen_mm);
         }
     }
 
-    /// Opens the ground that the machine has not seen, if the line is the operator's `start now`.
-    fn trust(&mut self, line: &str, unseen_mm: i16) {
-        if words(line) == ["start", "now"] && unseen_mm > 0 {
-            let machine = &self.machine;
-            let (tool, margin) = (self.here() - machine.ticks(Setting::BeamToToolMm), machine.ticks(Setting::MarginMm));
+    /// The machine works or not after a line. `start now` keeps the ground, and opens what the machine has not seen, but not after
+    /// it has rolled back.
+    fn follow_start(&mut self, line: &str, works: bool, unseen_mm: i16) {
+        let (machine, here) = (&self.machine, self.here());
+        let margin = machine.ticks(Setting::MarginMm);
+        // The distance rolled since the line was executed.
+        let late = if M::IS_OPEN { 0 } else { (self.physics.speed.abs() * ANSWERED_S) as i64 };
+        let expectations = &mut self.expectations;
+        let blur = expectations.blur();
+        let keeps = words(line) == ["start", "now"] && !expectations.model.has_rolled_back(here, margin, late + blur);
+        expectations.follow_work(works, keeps, here);
+        if works && keeps && unseen_mm > 0 {
+            let tool = here - machine.ticks(Setting::BeamToToolMm);
             let unseen = f64::from(unseen_mm + 1) * f64::from(machine.settings().wheel().ticks(1000).0) / 1000.0;
-            // The distance rolled since the line was executed.
-            let late = if M::IS_OPEN { 0 } else { (self.physics.speed.abs() * ANSWERED_S) as i64 };
             // That distance includes the margin ahead of the ground.
-            self.expectations.model.trust(tool - 2 * margin - late, tool + unseen as i64 - margin);
+            expectations.model.trust(tool - 2 * margin - late, tool + unseen as i64 - margin);
         }
     }
 
