@@ -78,7 +78,6 @@ impl Conditions {
     }
 
     fn parse(path: &Path, text: &str) -> Result<Self, FileError> {
-        bounded_file::check_nesting(path, text)?;
         let conditions: Self = toml::from_str(text).map_err(|error| {
             let byte = error.span().map_or(0, |span| span.start);
             FileError::at_byte(path, text, byte, explain(text, byte, &error))
@@ -116,8 +115,8 @@ impl Conditions {
     fn check_beams(&self) -> Result<(), WrongValue> {
         let Mechanism { beam_to_tool_mm, second_beam_mm, .. } = self.machine;
         let least = f64::from(SECOND_BEAM_LEAST_MM);
-        let is_too_far = beam_to_tool_mm.round() > f64::from(SLIPPING_BEAM_TO_TOOL_MM);
-        let (least, greatest) = if is_too_far { (0.0, 0.0) } else { (least, beam_to_tool_mm.round() - least) };
+        let has_room = (2.0 * least..=f64::from(SLIPPING_BEAM_TO_TOOL_MM)).contains(&beam_to_tool_mm.round());
+        let (least, greatest) = if has_room { (least, beam_to_tool_mm.round() - least) } else { (0.0, 0.0) };
         if second_beam_mm == 0.0 || (least..=greatest).contains(&second_beam_mm.round()) {
             return Ok(());
         }
@@ -129,6 +128,12 @@ impl Conditions {
 
     /// What is likely wrong with these conditions, in sentences.
     pub fn warning(&self) -> Option<String> {
+        let warnings: Vec<String> = self.cutting_sweeps().into_iter().chain(self.other_machine()).collect();
+        (!warnings.is_empty()).then(|| warnings.join(" "))
+    }
+
+    /// Whether the machine strays farther than its sweeps allow, in sentences.
+    fn cutting_sweeps(&self) -> Option<String> {
         let room_mm = self.machine.sweep_from_mm - self.crop.protected_mm / 2.0 - self.crop.across_scatter_mm;
         let strays_mm = self.driving.steering_mm;
         let strays_too_far = self.machine.sweeps_a_side > 0 && strays_mm > room_mm;
@@ -312,6 +317,10 @@ mod tests {
             (
                 "[machine]\nbeam_to_tool_mm = 1001\nsecond_beam_mm = 200\n",
                 "field.toml, line 3: machine.second_beam_mm is 200, but has to be 0 to 0",
+            ),
+            (
+                "[machine]\nbeam_to_tool_mm = 143\nsecond_beam_mm = 72\n",
+                "field.toml, line 3: machine.second_beam_mm is 72, but has to be 0 to 0",
             ),
             ("[settings]\nlead = 9\n", "field.toml, line 2: settings.lead is neither a parameter of the field"),
             (
