@@ -27,7 +27,7 @@ pub struct Arguments {
         long,
         value_name = "N",
         value_parser = whole_within(1..=MAX_K),
-        help = format!("Examples that vote, 1 to {MAX_K}; left out, as many as the firmware starts with")
+        help = format!("Examples that vote, 1 to {MAX_K}; left out, the k of the table's training")
     )]
     k: Option<u8>,
     /// Print a JSON object for each detection instead of the table.

@@ -5,9 +5,10 @@ use crate::ports::Port;
 use anyhow::{Result, bail, ensure};
 use clap::{Args, Subcommand};
 use comfy_table::{Table, presets};
+use field::counted;
 use field::row::Kind;
-use frame::{Finding, OutName, Replace, say, source, tell};
-use link::examples::{self, Taught, contradiction, example_of, features_of};
+use frame::{Finding, OutFile, OutName, Replace, say, source, tell};
+use link::examples::{self, OnMachine, Taught, contradiction, example_of, features_of};
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 use study::training::{Labelled, label_of, listing, table};
@@ -17,7 +18,7 @@ use study::training::{Labelled, label_of, listing, table};
     weeder examples pull chilli.csv             write the taught examples into a table
   weeder examples push chilli.csv             teach it to another machine
   weeder examples diff chilli.csv             list what only one of them has
-  weeder train chilli.csv dump.csv            learn from it, see docs/training.md")]
+  weeder train chilli.csv                     learn from it, see docs/training.md")]
 pub struct Arguments {
     #[command(subcommand)]
     action: Action,
@@ -25,7 +26,8 @@ pub struct Arguments {
 
 #[derive(Subcommand)]
 enum Action {
-    /// Write the machine's taught examples into a CSV file, for `weeder train` and `push`.
+    /// Write the machine's taught examples into a CSV file, for `weeder train` and `push`; the status is 1 if some are
+    /// invalid.
     #[command(after_help = "Example: weeder examples pull chilli.csv --port /dev/ttyACM0")]
     Pull {
         /// The file.
@@ -59,7 +61,8 @@ Example: weeder examples push chilli.csv --replace")]
         #[command(flatten)]
         port: Port,
     },
-    /// List the examples that only the table or only the machine has; the status is 1 if there is one.
+    /// List the examples that only the table or only the machine has; the status is 1 if there is one, or an invalid
+    /// one.
     #[command(after_help = "Example: weeder examples diff chilli.csv && echo the same")]
     Diff {
         /// The table; - for standard input.
@@ -78,7 +81,8 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     match &arguments.action {
         Action::Pull { file, replace, json, port } => {
             let file = file.as_ref().map(|file| file.file(*replace)).transpose()?;
-            let taught = on_machine(port)?;
+            let OnMachine { taught, spoiled } = on_machine(port, file.as_ref().map(OutFile::path))?;
+            let taught = examples_of(taught);
             let printed =
                 if *json { say!("{:#}", Value::from_iter(taught.iter().filter_map(in_json))) } else { Ok(()) };
             if let Some(file) = file {
@@ -89,7 +93,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
                 }
             }
             printed?;
-            Ok(Finding::Good)
+            Ok(Finding::of(spoiled == 0))
         }
         Action::Push { file, replace, force, json, port } => {
             let wanted = in_table(file)?;
@@ -109,11 +113,9 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
             Ok(Finding::Good)
         }
         Action::Diff { file, json, port } => {
-            let (wanted, found) = (in_table(file)?, on_machine(port)?);
-            let only = |of: &[Taught], than: &[Taught]| -> Vec<Taught> {
-                of.iter().filter(|example| !than.contains(example)).copied().collect()
-            };
-            let (in_file, on_machine) = (only(&wanted, &found), only(&found, &wanted));
+            let (wanted, found) = (in_table(file)?, on_machine(port, None)?);
+            let (in_file, surplus) = examples::compare(&wanted, &found.taught);
+            let on_machine = examples_of(surplus);
             let is_same = in_file.is_empty() && on_machine.is_empty();
             match *json {
                 true => {
@@ -123,28 +125,39 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
                 false if is_same => say!("The machine was taught the examples in {}", file.display())?,
                 false => say!("{}", differences(&in_file, &on_machine))?,
             }
-            Ok(Finding::of(is_same))
+            Ok(Finding::of(is_same && found.spoiled == 0))
         }
     }
 }
 
-/// The machine's taught examples, in the order of their numbers.
-fn on_machine(port: &Port) -> Result<Vec<Taught>> {
-    Ok(examples::read(&mut port.open()?)?.into_iter().map(|(_, example)| example).collect())
+/// Reads the machine's taught examples, in the order of their numbers. Warns of invalid ones. Fails if a table would
+/// lose them, because the others replace it.
+fn on_machine(port: &Port, replaced: Option<&Path>) -> Result<OnMachine> {
+    let found = examples::read(&mut port.open()?)?;
+    if found.spoiled > 0 {
+        let invalid = format!(
+            "Another built-in table or a damaged memory made {} of the machine invalid: `forget all`, then push their file",
+            counted(found.spoiled, "example")
+        );
+        if let Some(table) = replaced.filter(|path| path.metadata().is_ok_and(|there| there.len() > 0)) {
+            bail!("{invalid}. {} is not replaced", table.display());
+        }
+        tell!("{invalid}");
+    }
+    Ok(found)
 }
 
-/// A table's examples, each once. Only a table without lines has none. Fails if it is no such table.
+fn examples_of(numbered: Vec<(u16, Taught)>) -> Vec<Taught> {
+    numbered.into_iter().map(|(_, example)| example).collect()
+}
+
+/// A table's examples. Equal ones stay, because each votes. Only a table without lines has none. Fails if it is no such
+/// table.
 pub fn in_table(file: &Path) -> Result<Vec<Taught>> {
     let objects = table::read_or_empty(file)?;
-    let mut examples = Vec::new();
-    for object in &objects {
-        let Some(kind) = object.kind else { continue };
-        let example = example_of(&object.features, label_of(kind));
-        if !examples.contains(&example) {
-            examples.push(example);
-        }
-    }
-    let unlabelled = objects.iter().filter(|object| object.kind.is_none()).count();
+    let labelled = objects.iter().filter_map(|object| Some(example_of(&object.features, label_of(object.kind?))));
+    let examples: Vec<Taught> = labelled.collect();
+    let unlabelled = objects.len() - examples.len();
     ensure!(
         !examples.is_empty() || objects.is_empty(),
         "{} has no labelled detection: fill in the column {}, plant or weed",

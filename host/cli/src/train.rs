@@ -4,6 +4,7 @@
 use anyhow::{Result, bail, ensure};
 use clap::builder::TypedValueParser;
 use clap::{ArgGroup, Args};
+use control::{ground::examples, settings::Setting};
 use frame::{
     OutFile, OutName, Replace, say,
     source::{self, offering},
@@ -109,6 +110,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         true => say!("{:#}", in_json(&training, &objects, another_field.as_ref())),
         false => report(&training, &objects, another_field.as_ref()),
     };
+    tell_k(training.k);
     let is_rust = table.as_ref().is_some_and(|table| is_rust(table.path()));
     write_if_asked(table.as_ref(), "Table", arguments.json, |to| match is_rust {
         true => Ok(to.write_all(listing::rust(&training, &arguments.command()).as_bytes())?),
@@ -179,11 +181,20 @@ fn beside(arguments: &Arguments, table: Option<&OutFile>, objects: &[Labelled]) 
             chosen.len()
         ),
     };
+    tell_k(arguments.k.unwrap_or(examples::K));
     write_if_asked(table, "Table", arguments.json, |to| Ok(listing::write_csv(&chosen, to)?))?;
     if let Some(table) = table.filter(|_| chosen.is_empty()) {
         tell!("{} has no example: none improves the built-in table", table.path().display());
     }
     printed
+}
+
+/// Says how to set the k of the examples, if it is not the machine's default.
+fn tell_k(k: u8) {
+    let default = Setting::K.default();
+    if u16::from(k) != default {
+        tell!("These examples are for a k of {k}, and the machine starts with {default}: `set k {k}`, then `save`");
+    }
 }
 
 /// The report of a training. `another_field` has the seed of another field and the classification of its detections.

@@ -12,7 +12,7 @@ pub use control::ground::field_examples::CAPACITY;
 use control::ground::nearest::Nearest;
 use control::memory::Volatile;
 use knn::Example;
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::sync::LazyLock;
 use thiserror::Error;
 
@@ -26,7 +26,7 @@ pub enum ExamplesError {
     #[error(transparent)]
     Link(#[from] LinkError),
     #[error(
-        "the firmware has other built-in examples than this program, so its taught examples cannot be converted to millimetres: use its own `weeder`, or flash this one's firmware by `weeder flash`"
+        "the firmware has other built-in examples than this program, so its taught examples cannot be converted to millimetres: use its own `weeder` (after `weeder train`: `cargo install --locked --path host/cli`), or flash this one's firmware by `weeder flash`"
     )]
     OtherTable,
     #[error(
@@ -41,6 +41,15 @@ pub enum ExamplesError {
     NoRoom { new: usize, free: usize },
     #[error("{0} of the examples are not on the machine afterwards: try again, and see to the supply if it stays so")]
     NotTaken(usize),
+}
+
+/// The examples that a machine was taught.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct OnMachine {
+    /// The valid ones, with their numbers.
+    pub taught: Vec<(u16, Taught)>,
+    /// Invalid ones, which do not vote: taught for another built-in table, or damaged.
+    pub spoiled: u8,
 }
 
 /// The changes to a machine's examples.
@@ -71,13 +80,14 @@ impl Heading {
     }
 }
 
-/// Reads the examples that the machine was taught, with their numbers.
+/// Reads the examples that the machine was taught.
 ///
 /// # Errors
 /// If the console fails, [`ExamplesError::NoObject`] and [`ExamplesError::OtherTable`].
-pub fn read(link: &mut Link) -> Result<Vec<(u16, Taught)>, ExamplesError> {
+pub fn read(link: &mut Link) -> Result<OnMachine, ExamplesError> {
+    let lines = link.ask("examples")?;
     let (mut built_in, mut taught) = (Vec::new(), Vec::new());
-    for (from_field, number, example) in link.ask("examples")?.iter().filter_map(|line| self::taught(line)) {
+    for (from_field, number, example) in lines.iter().filter_map(|line| self::taught(line)) {
         if from_field {
             features_of(&example).ok_or(ExamplesError::NoObject(number))?;
             taught.push((number, example));
@@ -85,7 +95,19 @@ pub fn read(link: &mut Link) -> Result<Vec<(u16, Taught)>, ExamplesError> {
             built_in.push(example);
         }
     }
-    if built_in == EXAMPLES { Ok(taught) } else { Err(ExamplesError::OtherTable) }
+    let spoiled = lines.iter().find_map(|line| line.strip_prefix("spoiled=")?.parse().ok()).unwrap_or(0);
+    if built_in == EXAMPLES { Ok(OnMachine { taught, spoiled }) } else { Err(ExamplesError::OtherTable) }
+}
+
+/// The wanted examples that are not among those found, and those found beyond the wanted. Each of equal examples votes,
+/// so each counts.
+pub fn compare(wanted: &[Taught], found: &[(u16, Taught)]) -> (Vec<Taught>, Vec<(u16, Taught)>) {
+    let (mut missing, mut surplus) = (wanted.to_vec(), found.to_vec());
+    surplus.retain(|(_, example)| {
+        let place = missing.iter().position(|wanted| wanted == example);
+        place.map(|place| missing.remove(place)).is_none()
+    });
+    (missing, surplus)
 }
 
 /// The example in a line of the answer to `examples`: whether it is from the field, and its number.
@@ -101,12 +123,11 @@ pub fn taught(line: &str) -> Option<(bool, u16, Taught)> {
 /// [`ExamplesError::AtWork`] and [`ExamplesError::NoRoom`] before anything is sent; [`ExamplesError::NotTaken`]; and
 /// errors of the link.
 pub fn push(link: &mut Link, wanted: &[Taught], replace: bool) -> Result<Pushed, ExamplesError> {
-    let before = read(link)?;
-    let mut known: HashSet<Taught> = before.iter().map(|&(_, example)| example).collect();
-    let named: HashSet<Taught> = wanted.iter().copied().collect();
-    let stale: Vec<u16> =
-        before.iter().filter(|(_, example)| replace && !named.contains(example)).map(|&(number, _)| number).collect();
-    let new: Vec<&Taught> = wanted.iter().filter(|&&example| known.insert(example)).collect();
+    let before = read(link)?.taught;
+    let (new, mut stale) = compare(wanted, &before);
+    if !replace {
+        stale.clear();
+    }
     // A newer firmware may have room for more.
     let free = usize::from(CAPACITY).saturating_sub(before.len() - stale.len());
     if new.len() > free {
@@ -115,7 +136,7 @@ pub fn push(link: &mut Link, wanted: &[Taught], replace: bool) -> Result<Pushed,
     if settings::status(link)?.mode == Mode::Work {
         return Err(ExamplesError::AtWork);
     }
-    for number in &stale {
+    for (number, _) in &stale {
         link.ask(&format!("forget {number}"))?;
     }
     for example in &new {
@@ -123,10 +144,9 @@ pub fn push(link: &mut Link, wanted: &[Taught], replace: bool) -> Result<Pushed,
         // them and clears the buffer. The second try starts with an empty buffer.
         teach(link, example).or_else(|_| teach(link, example))?;
     }
-    let after = read(link)?;
-    let missing = named.iter().filter(|&&wanted| after.iter().all(|&(_, example)| example != wanted)).count();
-    if missing > 0 {
-        return Err(ExamplesError::NotTaken(missing));
+    let (missing, _) = compare(wanted, &read(link)?.taught);
+    if !missing.is_empty() {
+        return Err(ExamplesError::NotTaken(missing.len()));
     }
     Ok(Pushed { taught: new.len(), forgotten: stale.len() })
 }

@@ -164,7 +164,7 @@ fn examples_are_taught_after_features_of_an_earlier_command() {
         let mut link = link_to_machine(&vec!["teach 7"; left]);
         let pushed = examples::push(&mut link, &wanted, false).expect("it is taught");
         assert_eq!((pushed.taught, pushed.forgotten), (1, 0), "{left}");
-        assert_eq!(examples::read(&mut link).expect("it lists them"), [(0, wanted[0])], "{left}");
+        assert_eq!(examples::read(&mut link).expect("it lists them").taught, [(0, wanted[0])], "{left}");
     }
 }
 
@@ -175,7 +175,29 @@ fn a_machine_at_work_is_not_taught_and_forgets_nothing() {
     examples::push(&mut link, &[one], false).expect("it is in HOLD");
     link.ask("start").expect("it goes to work");
     assert_matches!(examples::push(&mut link, &[other], true), Err(ExamplesError::AtWork));
-    assert_eq!(examples::read(&mut link).expect("it lists them"), [(0, one)]);
+    assert_eq!(examples::read(&mut link).expect("it lists them").taught, [(0, one)]);
+}
+
+#[test]
+fn each_of_equal_examples_is_taught_and_forgotten() {
+    let one = examples::example_of(&Features::describe(278, 250, 20), label::PLANT);
+    let mut link = link_to_machine(&[]);
+    for (wanted, taught, forgotten) in [(1, 1, 0), (3, 2, 0), (2, 0, 1)] {
+        let pushed = examples::push(&mut link, &vec![one; wanted], true).expect("it is in HOLD");
+        assert_eq!((pushed.taught, pushed.forgotten), (taught, forgotten), "{wanted}");
+        assert_eq!(examples::read(&mut link).expect("it lists them").taught.len(), wanted);
+    }
+}
+
+#[test]
+fn invalid_examples_are_counted() {
+    for (answer, spoiled) in [("spoiled=0", 0), ("spoiled=3", 3)] {
+        let mut machine = machine();
+        let mut link = link(move |line| {
+            String::from_utf8(machine(line)).expect("it is text").replace("spoiled=0", answer).into_bytes()
+        });
+        assert_eq!(examples::read(&mut link).expect("it lists them").spoiled, spoiled);
+    }
 }
 
 #[test]

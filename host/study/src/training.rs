@@ -20,7 +20,7 @@ pub use self::model::{Model, class_of};
 pub use knn::MAX_K;
 
 use self::model::{answer_of_others, quantised};
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, anyhow, ensure};
 use control::ground::{
     class::{Class, label},
     examples,
@@ -101,7 +101,7 @@ const ENEMY_DIVISOR: u32 = 4;
 ///   not count.
 /// - **k**, if none is given: each odd k is tried by leaving one detection out and classifying it by all others. The
 ///   best k has the fewest plants classified as weeds, then the fewest weeds left, then the fewest unknown plants. Among equals the smallest from 3 on wins: with a k of 1 a single detection with a wrong label
-///   decides. A k whose table cuts more plants than all detections together is passed over.
+///   decides. A k is passed over if its table has no room, or cuts more plants than all detections together.
 /// - **Examples**: see [`condense`].
 ///
 /// # Errors
@@ -130,7 +130,13 @@ pub fn train(objects: &[Labelled], k: Option<u8>, most: usize) -> Result<Trainin
     tried.sort_by_key(|(_, leave_one_out)| leave_one_out.harm());
     let mut refused = None;
     for (k, leave_one_out) in tried {
-        let kept = condense::condense(&examples, &edited, k, radius, most)?;
+        let kept = match condense::condense(&examples, &edited, k, radius, most) {
+            Ok(kept) => kept,
+            Err(error) => {
+                refused.get_or_insert(error);
+                continue;
+            }
+        };
         let mut training = Training {
             ranges,
             radius,
@@ -143,14 +149,15 @@ pub fn train(objects: &[Labelled], k: Option<u8>, most: usize) -> Result<Trainin
         training.by_table = training.model().classify(objects);
         match training.by_table.plants_taken_for_weeds().saturating_sub(leave_one_out.plants_taken_for_weeds()) {
             0 => return Ok(training),
-            plants => refused = refused.or(Some((k, plants))),
+            plants => {
+                refused.get_or_insert_with(|| {
+                    let plants = counted(plants, "plant");
+                    anyhow!("with a vote of {k}, so few examples cut {plants} that all detections together spare: choose a smaller --k, or label more")
+                });
+            }
         }
     }
-    let (k, plants) = refused.context(NO_OBJECTS)?;
-    bail!(
-        "with a vote of {k}, so few examples cut {} that all detections together spare: choose a smaller --k, or label more",
-        counted(plants, "plant")
-    )
+    Err(refused.context(NO_OBJECTS)?)
 }
 
 /// Examples to teach in the field, in addition to the built-in ones.

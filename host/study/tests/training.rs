@@ -171,10 +171,14 @@ fn a_few_detections_do_not_make_weeds_of_detections_nearer_to_plants() {
 
 #[test]
 fn a_table_that_cuts_plants_which_all_objects_together_spare_is_refused() {
-    let objects = synthetic::objects(&CROPS[0], 1).unwrap();
-    let few = train(&objects, None, DEFAULT_MOST_EXAMPLES).unwrap().kept;
-    let error = train(&few, Some(15), DEFAULT_MOST_EXAMPLES).unwrap_err();
-    assert!(error.to_string().starts_with("with a vote of 15, so few examples cut "), "{error}");
+    // Plants and weeds of nearly the same widths, mixed along the row.
+    let object = |n: i16| {
+        let (kind, narrowest_mm) = if n % 3 == 0 { (Kind::Weed, 4) } else { (Kind::Plant, 14) };
+        labelled(kind, 278, 60 + 37 * n % 160, narrowest_mm + 19 * n % 17)
+    };
+    let objects: Vec<Labelled> = (0..24).map(object).collect();
+    let error = train(&objects, Some(11), DEFAULT_MOST_EXAMPLES).unwrap_err();
+    assert!(error.to_string().starts_with("with a vote of 11, so few examples cut 1 plant "), "{error}");
 }
 
 #[test]
@@ -188,6 +192,28 @@ fn as_many_examples_are_kept_as_vote() {
 fn objects_that_need_more_examples_than_there_is_room_for_are_refused_by_name() {
     let error = train(&synthetic::objects(&CROPS[0], 1).unwrap(), None, 10).unwrap_err().to_string();
     assert!(error.starts_with("too many examples: ") && error.ends_with(", or choose a larger --max"), "{error}");
+}
+
+#[test]
+fn more_room_never_refuses_what_less_room_takes() {
+    // Weeds among narrow plants: a table filled up with plants would need more weeds.
+    let object = |n: i16| {
+        let (kind, narrowest_mm) = if n % 2 == 0 { (Kind::Weed, 4) } else { (Kind::Plant, 12) };
+        labelled(kind, 278, 60 + 41 * n % 160, narrowest_mm + 19 * n % 17)
+    };
+    let objects: Vec<Labelled> = (0..24).map(object).collect();
+    for most in 4..=24 {
+        let training = train(&objects, Some(3), most).unwrap();
+        assert!(training.kept.len() <= most, "{most}");
+    }
+}
+
+#[test]
+fn a_k_whose_table_has_no_room_is_passed_over() {
+    let plants = (0..3).map(|n| labelled(Kind::Plant, 556, 500 + n, 150));
+    let weeds = (0..3).map(|n| labelled(Kind::Weed, 556, 300 + n, 16));
+    let objects: Vec<Labelled> = plants.chain(weeds).collect();
+    assert_eq!([2, 3].map(|most| train(&objects, None, most).unwrap().k), [1, 3]);
 }
 
 #[test]
@@ -342,6 +368,9 @@ fn objects_to_be_classified_need_no_label() {
     let objects = read(&paths[0]).unwrap();
     assert_eq!(objects.len(), 1);
     assert_eq!(objects[0].kind, None);
+    let (_folder, paths) = files(&[&format!("{}694,500,226,250,573,plant\n", HEADER.replace("label", "Label"))]);
+    let error = read(&paths[0]).unwrap_err().to_string();
+    assert!(error.contains("did you mean label by `Label`?"), "{error}");
 }
 
 #[test]

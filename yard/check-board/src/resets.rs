@@ -77,7 +77,7 @@ impl Kept {
         boards.reset()?;
         Ok(Self {
             settings: boards.weeder.ask("get")?.iter().filter_map(|line| settings::shown(line)).collect(),
-            examples: examples::read(&mut boards.weeder)?,
+            examples: examples::read(&mut boards.weeder)?.taught,
         })
     }
 
@@ -149,7 +149,7 @@ impl Boards {
         try_it: impl FnOnce(&mut Self) -> Result<T, CheckError>,
     ) -> Result<T, CheckError> {
         self.weeder.to_hold()?;
-        let is_taught = examples::read(&mut self.weeder)?.is_empty();
+        let is_taught = examples::read(&mut self.weeder)?.taught.is_empty();
         if is_taught {
             examples::push(&mut self.weeder, &EXAMPLES[..1], false)?;
         }

@@ -3,7 +3,7 @@
 use crate::typed::{printed, typed};
 use std::fs;
 use std::io::{BufRead, BufReader};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::thread;
 use std::time::Duration;
@@ -77,7 +77,13 @@ fn a_receiver_that_is_unplugged_and_plugged_in_again_goes_on_in_the_record() {
 
 /// A virtual Uno at rest that runs at full speed.
 fn uno() -> Background {
-    let setup = Setup { elf: Some(firmware::build().expect("the firmware builds")), fast: true, ..Setup::default() };
+    uno_with(None)
+}
+
+/// The same, with the EEPROM in this file.
+fn uno_with(eeprom: Option<PathBuf>) -> Background {
+    let elf = Some(firmware::build().expect("the firmware builds"));
+    let setup = Setup { elf, eeprom, fast: true, ..Setup::default() };
     LiveRows::start(vec![setup]).expect("there is a pseudo terminal").run_in_background()
 }
 
@@ -117,6 +123,8 @@ fn settings_are_pulled_changed_compared_and_pushed() {
     printed(&weeder(&["settings", "diff", name], uno.path(), ""), 0);
     let json = printed(&weeder(&["settings", "pull", "--json"], uno.path(), ""), 0);
     assert!(json.contains("\"wheel_mm\": 405") && json.contains("\"end_switch\": false"), "{json}");
+    let piped = printed(&weeder(&["settings", "pull", "/dev/stdout"], uno.path(), ""), 0);
+    assert!(piped.contains("\nwheel_mm = 405\n"), "{piped}");
     // `--force` replaces it, and keeps its comments.
     fs::write(&file, "wheel_mm = 390 # measured\n").expect("it can be written");
     printed(&weeder(&["settings", "pull", name, "--force"], uno.path(), ""), 0);
@@ -130,18 +138,18 @@ fn examples_are_pulled_taught_to_another_machine_and_compared() {
     let folder = tempfile::tempdir().expect("there is room for a file");
     let [taught, again] = ["taught.csv", "again.csv"].map(|name| folder.path().join(name));
     let [taught, again] = [&taught, &again].map(|path| path.to_str().expect("it is text"));
-    // Stalks, which the built-in examples classify as weeds, and the weeds beside them.
+    // A stalk, which the built-in examples classify as a weed, and two equal weeds beside it: each votes.
     let heading = "speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,label\n";
     let table = format!("{heading}278,250,300,120,459,plant\n278,100,300,108,447,weed\n278,100,300,108,447,weed\n");
     fs::write(taught, &table).expect("it can be written");
 
     let refused = printed(&weeder(&["examples", "push", taught], uno.path(), ""), 2);
-    assert!(refused.contains("1 of 2 examples") && refused.contains("--force"), "{refused}");
+    assert!(refused.contains("1 of 3 examples") && refused.contains("--force"), "{refused}");
     let nothing = printed(&weeder(&["examples", "pull", again], uno.path(), ""), 0);
     assert!(nothing.ends_with(": 0 examples\n"), "{nothing}");
     printed(&weeder(&["examples", "diff", again], uno.path(), ""), 0);
     let pushed = printed(&weeder(&["examples", "push", taught, "--force"], uno.path(), ""), 0);
-    assert_eq!(pushed, "Taught: 2. Known already: 0.\n");
+    assert_eq!(pushed, "Taught: 3. Known already: 0.\n");
     let pushed = printed(&weeder(&["examples", "push", taught, "--force", "--json"], uno.path(), ""), 0);
     let pushed: serde_json::Value = serde_json::from_str(&pushed).expect("it is JSON");
     assert_eq!(pushed, serde_json::json!({ "taught": 0, "forgotten": 0 }));
@@ -156,19 +164,33 @@ fn examples_are_pulled_taught_to_another_machine_and_compared() {
     let differences = printed(&weeder(&["examples", "diff", taught], other.path(), ""), 1);
     assert!(differences.contains("in the file") && differences.contains("on the machine"), "{differences}");
     let pushed = printed(&weeder(&["examples", "push", taught, "--force", "--replace"], other.path(), ""), 0);
-    assert_eq!(pushed, "Taught: 1. Known already: 1.\nForgotten: 1.\n");
+    assert_eq!(pushed, "Taught: 1. Known already: 2.\nForgotten: 1.\n");
     printed(&weeder(&["examples", "diff", taught], other.path(), ""), 0);
 
     let many: String = (0..40).map(|place| format!("278,{},300,108,447,weed\n", 60 + 10 * place)).collect();
     fs::write(taught, format!("{heading}{many}")).expect("it can be written");
     let refused = printed(&weeder(&["examples", "push", taught, "--force"], other.path(), ""), 2);
-    assert!(refused.contains("room for 30 of its 32") && refused.contains("nothing was sent"), "{refused}");
+    assert!(refused.contains("room for 29 of its 32") && refused.contains("nothing was sent"), "{refused}");
     fs::write(taught, format!("{heading}278,250,300,120,459,\n")).expect("it can be written");
     let refused = printed(&weeder(&["examples", "push", taught], other.path(), ""), 2);
     assert!(refused.contains("has no labelled detection"), "{refused}");
     fs::write(taught, heading).expect("it can be written");
     let pushed = printed(&weeder(&["examples", "push", taught, "--replace"], other.path(), ""), 0);
-    assert_eq!(pushed, "Taught: 0. Known already: 0.\nForgotten: 2.\n");
+    assert_eq!(pushed, "Taught: 0. Known already: 0.\nForgotten: 3.\n");
+}
+
+#[test]
+fn invalid_examples_are_told_and_replace_no_table() {
+    let folder = tempfile::tempdir().expect("there is room for files");
+    let [eeprom, table] = ["uno.eeprom", "table.csv"].map(|name| folder.path().join(name));
+    fs::write(&eeprom, [0; 1024]).expect("it can be written");
+    let uno = uno_with(Some(eeprom));
+    let name = table.to_str().expect("it is text");
+    let pulled = printed(&weeder(&["examples", "pull", name], uno.path(), ""), 1);
+    assert!(pulled.contains(": 0 examples\n") && pulled.contains("made 32 examples"), "{pulled}");
+    printed(&weeder(&["examples", "diff", name], uno.path(), ""), 1);
+    let refused = printed(&weeder(&["examples", "pull", name, "--force"], uno.path(), ""), 2);
+    assert!(refused.contains("table.csv is not replaced"), "{refused}");
 }
 
 #[test]
@@ -298,6 +320,18 @@ fn a_line_that_cannot_be_sent_is_refused_by_its_number_and_hold_behind_it_is_sen
 }
 
 #[test]
+fn a_log_that_the_disk_does_not_take_keeps_no_hold_from_being_typed() {
+    let uno = uno();
+    let folder = tempfile::tempdir().expect("there is room for a file");
+    let full_disk = "trap '' XFSZ; ulimit -f 1; exec \"$0\" \"$@\"";
+    let mut monitor = Command::new("sh");
+    monitor.args(["-c", full_disk, env!("CARGO_BIN_EXE_weeder"), "monitor", "--plain", "--port"]).arg(uno.path());
+    let said = printed(&typed(monitor.arg("--log").arg(folder.path().join("log.csv")), "get k\nhold\n"), 2);
+    assert!(said.contains("log.csv is not whole: it could not be written"), "{said}");
+    assert_eq!(said.lines().filter(|line| *line == "ok").count(), 2, "{said}");
+}
+
+#[test]
 fn a_session_is_logged_and_replayed() {
     let uno = uno();
     let folder = tempfile::tempdir().expect("there is room for a file");
@@ -329,8 +363,16 @@ fn ports_logs_and_recordings_that_do_not_exist_are_named() {
 fn a_terminated_virtual_uno_removes_its_link() {
     let folder = tempfile::tempdir().expect("there is room for a link");
     let link = folder.path().join("uno");
-    for signal in ["-INT", "-TERM", "-HUP"] {
-        let mut uno = Command::new(env!("CARGO_BIN_EXE_weeder"))
+    // As after `nohup`, a signal that was ignored at the start stays ignored.
+    for (signal, started, ignored) in [
+        ("-INT", "--default-signal", 0),
+        ("-TERM", "--default-signal", 0),
+        ("-HUP", "--default-signal", 0),
+        ("-INT", "--ignore-signal=HUP", 1),
+        ("-TERM", "--ignore-signal=HUP", 1),
+    ] {
+        let mut uno = Command::new("env")
+            .args(["--default-signal", started, env!("CARGO_BIN_EXE_weeder")])
             .args(["virtual-uno", "--stand", "--bootloader", "optiboot", "--link"])
             .arg(&link)
             .stdout(Stdio::piped())
@@ -339,6 +381,9 @@ fn a_terminated_virtual_uno_removes_its_link() {
         let mut line = String::new();
         BufReader::new(uno.stdout.take().expect("it is piped")).read_line(&mut line).expect("it says where it is");
         assert!(link.is_symlink(), "{line}");
+        let status = fs::read_to_string(format!("/proc/{}/status", uno.id())).expect("it runs");
+        let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:\t")).expect("Linux lists them");
+        assert_eq!(u64::from_str_radix(mask, 16).expect("it is a number") & 1, ignored, "SIGHUP");
         Command::new("kill").args([signal, &uno.id().to_string()]).status().expect("there is a kill");
         assert!(uno.wait().expect("it ends").success(), "{signal}");
         assert!(!link.is_symlink(), "{signal} has left it behind");

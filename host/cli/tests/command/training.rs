@@ -96,18 +96,29 @@ fn a_table_larger_than_the_flash_budget_is_refused_by_name() {
 
 #[test]
 fn objects_that_take_more_examples_than_the_flash_has_room_for_are_refused_by_name() {
-    // Plants and weeds in a chessboard pattern, 200 of each; four detections a square, so that none is noise.
+    // Plants and weeds in a chessboard pattern, 80 of each; four detections a square, so that none is noise.
     let square = |place: i32| {
         let (spacing_mm, hold_mm) = (100 + place / 20 * 50, 100 + place % 20 * 10);
         let label = if (place / 20 + place) % 2 == 0 { "plant" } else { "weed" };
         let line = |aside_mm: i32| format!("694,{},226,{hold_mm},500,{label}\n", spacing_mm + aside_mm);
         (0..4).map(line).collect::<String>()
     };
-    let chessboard: String = (0..400).map(square).collect();
+    let chessboard: String = (0..160).map(square).collect();
     for (most, other) in [(64, ", or choose a larger --max"), (MOST_EXAMPLES, "\n")] {
         let room =
             format!("there is room for {most}: remove detections with a wrong label, or unlike all others{other}");
         assert_not_taken(&chessboard, &["train", "objects.csv", "--max", &most.to_string()], &room);
+    }
+}
+
+#[test]
+fn a_k_that_is_not_the_machine_s_default_is_told() {
+    let detection = |n: i32| format!("556,50{n},250,250,578,plant\n556,30{n},250,116,444,weed\n");
+    let folder = folder_with(&[0, 1, 2].map(detection).concat());
+    for (k, is_told) in [("1", true), ("3", false)] {
+        let output = weeder(folder.path(), &["train", "objects.csv", "--k", k]);
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success() && told.contains("`set k 1`, then `save`") == is_told, "{told}");
     }
 }
 

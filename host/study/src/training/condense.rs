@@ -8,8 +8,8 @@
 //!    later. A plant must not be classified as a weed. Hart adds such detections in their order. Here the next one is
 //!    the detection with the most others of its class around it that are mistreated too and have no example near.
 //! 3. **Filling up**: plants without an example near are unknown, which spares them. While there is room they are added
-//!    in the same order, and in any case until `k` examples can vote. Hart's rule is checked last. A table is refused
-//!    if it would need more examples than there is room for.
+//!    in the same order, and in any case until `k` examples can vote. Hart's rule is checked last. While that needs
+//!    more examples than there is room for, the last plant is left out. Without these plants, the table is refused.
 //!
 //! Among equals the first in the list is chosen.
 
@@ -74,13 +74,20 @@ pub fn condense(examples: &[Example<COUNT>], edited: &[usize], k: u8, radius: u3
     let is_stranger = |index: usize, kept: &[Example<COUNT>]| {
         kept.iter().all(|example| !are_fellows(example, &examples[index], radius))
     };
+    let fewest = kept.len();
     keep_most_needed(examples, edited, &mut kept, most, radius, is_stranger);
-    let others: Vec<usize> = edited.iter().copied().filter(|index| !kept.contains(index)).collect();
-    kept.extend(others.iter().take(usize::from(k).saturating_sub(kept.len())));
-    // A plant that is no longer a stranger can be outvoted by the weeds around it, and so can a weed.
-    keep_most_needed(examples, edited, &mut kept, usize::MAX, half, is_mistreated);
-    check_room(kept.len().max(usize::from(k)), most, other)?;
-    Ok(kept)
+    loop {
+        let mut table = kept.clone();
+        let others = edited.iter().filter(|index| !kept.contains(index));
+        table.extend(others.take(usize::from(k).saturating_sub(kept.len())));
+        // A plant that is no longer a stranger can be outvoted by the weeds around it, and so can a weed.
+        keep_most_needed(examples, edited, &mut table, usize::MAX, half, is_mistreated);
+        let checked = check_room(table.len().max(usize::from(k)), most, other);
+        if checked.is_ok() || kept.len() == fewest {
+            return checked.map(|()| table);
+        }
+        kept.pop();
+    }
 }
 
 /// Chooses at most `most` of `examples` to add to those that are `given`. All plants must be spared. As many weeds as

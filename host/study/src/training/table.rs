@@ -38,7 +38,8 @@ pub struct Recorded {
 /// # Errors
 /// Names the file, the line and what would be right.
 pub fn read(path: &Path) -> Result<Vec<Recorded>, FileError> {
-    let read: Vec<_> = detections(&CsvTable::read(path, &COLUMNS)?).map(object).collect::<Result<_, _>>()?;
+    let read: Vec<_> =
+        detections(&CsvTable::read(path, &COLUMNS)?.with_optional(&[LABEL])?).map(object).collect::<Result<_, _>>()?;
     if read.is_empty() {
         let problem = "no line is below the header: add at least one".to_owned();
         return Err(FileError::Line { path: path.into(), line: 1, problem });
@@ -51,7 +52,7 @@ pub fn read(path: &Path) -> Result<Vec<Recorded>, FileError> {
 /// # Errors
 /// As [`read`], but a table without lines is none.
 pub fn read_or_empty(path: &Path) -> Result<Vec<Recorded>, FileError> {
-    detections(&CsvTable::read_or_empty(path, &COLUMNS)?).map(object).collect()
+    detections(&CsvTable::read_or_empty(path, &COLUMNS)?.with_optional(&[LABEL])?).map(object).collect()
 }
 
 /// Detections to learn from, and what was passed over.
@@ -73,7 +74,8 @@ pub struct ToLearn {
 /// Names the file, the line and what would be right.
 pub fn read_labelled(paths: &[PathBuf]) -> Result<ToLearn, FileError> {
     let columns: Vec<&str> = COLUMNS.into_iter().chain([LABEL]).collect();
-    let tables = paths.iter().map(|path| CsvTable::read(path, &columns)).collect::<Result<Vec<_>, _>>()?;
+    let table = |path: &PathBuf| CsvTable::read(path, &columns)?.with_optional(&PLACE);
+    let tables = paths.iter().map(table).collect::<Result<Vec<_>, _>>()?;
     let (mut read, mut seen, mut last) = (ToLearn::default(), HashMap::new(), None);
     for line in tables.iter().flat_map(detections) {
         last = Some(line);
