@@ -44,6 +44,7 @@ use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
 use frame::{Finding, program, row};
 use inside::INSIDE;
+use signal_hook::consts::{SIGINT, SIGTERM};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -175,7 +176,12 @@ fn main() -> ExitCode {
 fn ctrl_c() -> Result<Arc<AtomicBool>> {
     let stop = Arc::new(AtomicBool::new(false));
     let asked_to_stop = Arc::clone(&stop);
-    ctrlc::set_handler(move || asked_to_stop.store(true, Ordering::Relaxed)).context("Ctrl-C cannot be caught")?;
+    if ctrlc::try_set_handler(move || asked_to_stop.store(true, Ordering::Relaxed)).is_err() {
+        // One of the signals is ignored already. `nohup` ignores SIGHUP, which then ends nothing.
+        for signal in [SIGINT, SIGTERM] {
+            signal_hook::flag::register(signal, Arc::clone(&stop)).context("Ctrl-C cannot be caught")?;
+        }
+    }
     Ok(stop)
 }
 

@@ -28,7 +28,14 @@ macro_rules! tell {
 /// # Errors
 /// Any error of standard output, except a pipe that its reader has closed.
 pub fn print(text: Arguments) -> Result<()> {
-    let mut output = io::stdout().lock();
+    print_to(&mut io::stdout().lock(), text)
+}
+
+/// As [`print()`], to this output.
+///
+/// # Errors
+/// As [`print()`].
+pub fn print_to(output: &mut impl Write, text: Arguments) -> Result<()> {
     match output.write_fmt(text).and_then(|()| output.flush()) {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
         written => written.context("the result cannot be printed"),

@@ -208,6 +208,9 @@ pub fn claim(name: &str) -> Result<Claim, LinkError> {
     let lock = File::options().create(true).append(true).open(&path).or_else(|_| File::open(&path));
     let not_locked = |source| LinkError::NotClaimed { path: path.clone(), source };
     let lock = lock.map_err(not_locked)?;
+    // Other users lock it too, whatever this one's umask. It may be another user's.
+    #[cfg(unix)]
+    let _ = lock.set_permissions(std::os::unix::fs::PermissionsExt::from_mode(0o644));
     match lock.try_lock() {
         Ok(()) => Ok(Claim { _lock: lock }),
         Err(TryLockError::WouldBlock) => Err(LinkError::Flashed(name.to_owned())),
@@ -360,6 +363,14 @@ pub(super) mod tests {
         }
         drop(claimed);
         drop(claim(port).unwrap());
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            std::fs::set_permissions(lock_of(port), PermissionsExt::from_mode(0o600)).unwrap();
+            drop(claim(port).unwrap());
+            let mode = std::fs::metadata(lock_of(port)).unwrap().permissions().mode();
+            assert_eq!(mode & 0o777, 0o644, "another user can lock it");
+        }
         std::fs::remove_file(lock_of(port)).unwrap();
     }
 

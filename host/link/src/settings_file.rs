@@ -40,7 +40,8 @@ pub fn read(path: &Path) -> Result<Named, FileError> {
 /// # Errors
 /// As [`read`], and if the file cannot be written.
 pub fn write(path: &Path, shown: &Shown) -> Result<(), FileError> {
-    let old = if path.exists() { bounded_file::text(path)? } else { HEAD.to_owned() };
+    // A pipe or a device has no comments to keep, and may have no end.
+    let old = if path.is_file() { bounded_file::text(path)? } else { HEAD.to_owned() };
     let new = updated(path, &old, shown)?;
     let written = whole_file::write(path, |to| to.write_all(new.as_bytes()));
     written.map_err(|source| FileError::unwritten(path, source))
@@ -53,7 +54,6 @@ pub(super) fn no_toml(path: &Path, text: &str, error: &TomlError) -> FileError {
 }
 
 fn parse(path: &Path, text: &str) -> Result<(DocumentMut, Named), FileError> {
-    bounded_file::check_nesting(path, text)?;
     let document: DocumentMut = text.parse().map_err(|error| no_toml(path, text, &error))?;
     let (mut settings, mut foreign) = (Vec::new(), Vec::new());
     let mut old_merge_gap = None;

@@ -128,6 +128,10 @@ impl LogWriter {
     /// If the file cannot be written, is something else, is too long, or is written by another program.
     pub fn open(path: &Path) -> Result<Self, LogError> {
         let failed = |source| FileError::unwritten(path, source);
+        // A device or a pipe may have no end.
+        if path.metadata().is_ok_and(|found| !found.is_file()) {
+            return Err(LogError::NoLog(path.into()));
+        }
         let mut file = open_alone(path).map_err(|error| match error.kind() {
             ErrorKind::WouldBlock => LogError::Shared(path.into()),
             _ => failed(error).into(),
@@ -470,6 +474,10 @@ mod tests {
             fs::write(file.path(), other).unwrap();
             assert!(matches!(LogWriter::open(file.path()), Err(LogError::NoLog(_))));
             assert_eq!(fs::read_to_string(file.path()).unwrap(), other);
+        }
+        let folder = tempfile::tempdir().unwrap();
+        for no_file in [folder.path(), Path::new("/dev/null")].into_iter().filter(|path| path.exists()) {
+            assert!(matches!(LogWriter::open(no_file), Err(LogError::NoLog(_))), "{}", no_file.display());
         }
         fs::write(file.path(), format!("\u{feff}{HEADER}\r\n0,lost,gone\r\n")).unwrap();
         assert_eq!(LogWriter::open(file.path()).unwrap().lines(), 1);

@@ -5,21 +5,22 @@
 //! row.
 //!
 //! A script keeps its order, because it may set values and then hold. But if an answer does not come, a `hold` behind it
-//! goes first, and the lines between are not sent.
+//! goes first, and the lines between are not sent. An output or a log that fails does not end the session before the
+//! input: a `hold` may still come.
 
 use super::addressed;
 use crate::input::{self, Line};
 use crate::ports::Chosen;
 use crate::record::Logs;
 use anyhow::{Result, ensure};
-use frame::{Finding, tell};
+use frame::{Finding, print_to, tell};
 use link::advice;
 use link::examples::Heading;
 use link::rows::{Heard, Hold, Rows, What};
 use link::session::Happening;
 use link::settings::other_version;
 use std::collections::VecDeque;
-use std::io::{self, ErrorKind, Write};
+use std::io::{self, Write};
 use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::{Duration, Instant};
 
@@ -39,13 +40,7 @@ const LONGEST_REPORT: Duration = Duration::from_secs(2);
 /// says which rows were there when they were opened. Fails if a line was not sent, an Uno goes away with commands
 /// unanswered, or output or log fail.
 pub fn run(rows: &Rows, are_there: &[bool], chosen: &Chosen, logs: Option<Logs>) -> Result<Finding> {
-    match Talk::new(rows, are_there, chosen, logs).run(&input::typed(), &mut io::stdout().lock()) {
-        // The reader has closed the pipe: it has read enough.
-        Err(error) if error.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == ErrorKind::BrokenPipe) => {
-            Ok(Finding::Good)
-        }
-        result => result,
-    }
+    Talk::new(rows, are_there, chosen, logs).run(&input::typed(), &mut io::stdout().lock())
 }
 
 /// How a row stands.
@@ -74,6 +69,8 @@ struct Talk<'a> {
     hold: Option<Hold>,
     /// The numbers of lines that could not be sent.
     unsent: Vec<String>,
+    /// Whether all could be printed.
+    is_printed: bool,
     finding: Finding,
 }
 
@@ -89,6 +86,7 @@ impl<'a> Talk<'a> {
             moved_at: Instant::now(),
             hold: None,
             unsent: Vec::new(),
+            is_printed: true,
             finding: Finding::Good,
         }
     }
@@ -112,7 +110,7 @@ impl<'a> Talk<'a> {
             };
             if let Some(line) = next {
                 self.moved_at = Instant::now();
-                self.command(&line, output)?;
+                self.command(&line, output);
             }
             let ended = has_all && self.waiting.is_empty();
             // Two statuses after a command, all its events have come.
@@ -123,7 +121,6 @@ impl<'a> Talk<'a> {
             }
             let Some(heard) = self.rows.next(LOOK) else { continue };
             self.take(&heard, ended, output)?;
-            output.flush()?;
         }
     }
 
@@ -138,6 +135,8 @@ impl<'a> Talk<'a> {
         ensure!(failed.is_empty(), "not all was answered by {}", failed.join(", "));
         let lines = if self.unsent.len() == 1 { "line" } else { "lines" };
         ensure!(self.unsent.is_empty(), "not sent: {lines} {}", self.unsent.join(", "));
+        ensure!(self.is_printed, "not all could be printed");
+        self.logs.as_ref().map_or(Ok(()), Logs::check)?;
         Ok(self.finding)
     }
 
@@ -158,19 +157,29 @@ impl<'a> Talk<'a> {
         self.unsent.push(line.number.to_string());
     }
 
+    /// Prints a line, unless an earlier one has failed.
+    fn print(&mut self, line: &str, output: &mut impl Write) {
+        if self.is_printed
+            && let Err(error) = print_to(output, format_args!("{line}\n"))
+        {
+            tell!("error: {error:#}");
+            self.is_printed = false;
+        }
+    }
+
     /// Types a line to the addressed rows. A line that cannot be sent is reported, and the next one may be `hold`.
-    fn command(&mut self, line: &Line, output: &mut impl Write) -> Result<()> {
+    fn command(&mut self, line: &Line, output: &mut impl Write) {
         let names = self.chosen.names();
         let (to, command) = match addressed(&line.text, &names, None) {
             Ok(sent) => sent,
             Err(why) => {
                 self.refuse(line, &why);
-                return Ok(());
+                return;
             }
         };
         // The machine does not answer a line without a word.
         if command.is_empty() {
-            return Ok(());
+            return;
         }
         let to = to.map_or(0..self.rows.count(), |row| row..row + 1);
         if self.chosen.are_several && to.len() == self.rows.count() && link::is_hold(command) {
@@ -180,7 +189,7 @@ impl<'a> Talk<'a> {
             let standing = &mut self.standing[row];
             if !standing.is_there {
                 standing.has_failed = true;
-                writeln!(output, "{}", self.chosen.under_name(row, "error: the row is not there"))?;
+                self.print(&self.chosen.under_name(row, "error: the row is not there"), output);
                 if link::is_hold(command) {
                     self.rows.hold(row);
                 }
@@ -189,16 +198,18 @@ impl<'a> Talk<'a> {
             (standing.unanswered, standing.statuses) = (standing.unanswered + 1, 0);
             self.rows.command(row, command);
         }
-        self.report_hold(output)
+        self.report_hold(output);
     }
 
     fn take(&mut self, heard: &Heard, ended: bool, output: &mut impl Write) -> Result<()> {
         let row = heard.row;
         let standing = &mut self.standing[row];
         if let (Some(logs), What::Happened(happening)) = (&mut self.logs, &heard.what) {
-            logs.write(row, |log| log.write(log.now_ms(), happening))?;
+            let written = logs.write(row, |log| log.write(log.now_ms(), happening));
+            // It prints the error. The session goes on, even without any log.
+            let _ = logs.go_on_after(written, row, self.chosen);
         }
-        let mut print = |line: &str| writeln!(output, "{}", self.chosen.under_name(row, line));
+        let mut said = None;
         match &heard.what {
             What::Happened(Happening::Connected { version, shown, .. }) => {
                 standing.is_there = true;
@@ -213,7 +224,7 @@ impl<'a> Talk<'a> {
             What::Happened(Happening::Started { while_at_work, .. }) => {
                 if let Some(cause) = while_at_work {
                     standing.has_failed = true;
-                    print(&format!("error: {}", advice::restarted(cause)))?;
+                    said = Some(format!("error: {}", advice::restarted(cause)));
                 }
             }
             What::Happened(Happening::Lost(why)) => {
@@ -223,7 +234,7 @@ impl<'a> Talk<'a> {
                 ensure!(self.chosen.are_several || was_idle && !ended, "{why}");
                 tell!("{}", self.chosen.under_name(row, why));
             }
-            What::Happened(Happening::Event(_, line)) => print(line)?,
+            What::Happened(Happening::Event(_, line)) => said = Some(line.clone()),
             What::Happened(Happening::Answer(line)) => {
                 standing.statuses = 0;
                 self.moved_at = Instant::now();
@@ -231,7 +242,7 @@ impl<'a> Talk<'a> {
                 if let Some(head) = standing.heading.before(line) {
                     tell!("{}", self.chosen.under_name(row, head));
                 }
-                print(line)?;
+                said = Some(line.clone());
             }
             What::Happened(Happening::Answered { refusal, .. }) => {
                 standing.unanswered = standing.unanswered.saturating_sub(1);
@@ -242,21 +253,24 @@ impl<'a> Talk<'a> {
             What::NotTyped { command, why } => {
                 standing.unanswered = standing.unanswered.saturating_sub(1);
                 standing.has_failed = true;
-                print(&format!("error: `{command}` was not typed: {why}"))?;
+                said = Some(format!("error: `{command}` was not typed: {why}"));
             }
+        }
+        if let Some(line) = said {
+            self.print(&self.chosen.under_name(row, &line), output);
         }
         if let Some(hold) = &mut self.hold {
             hold.take(heard);
         }
-        self.report_hold(output)
+        self.report_hold(output);
+        Ok(())
     }
 
     /// Prints the result of a `hold` to all rows, once no row is left to answer.
-    fn report_hold(&mut self, output: &mut impl Write) -> Result<()> {
+    fn report_hold(&mut self, output: &mut impl Write) {
         if let Some(hold) = self.hold.take_if(|hold| hold.is_over()) {
-            writeln!(output, "{}", hold.summary(&self.chosen.names()))?;
+            self.print(&hold.summary(&self.chosen.names()), output);
         }
-        Ok(())
     }
 }
 
@@ -267,7 +281,7 @@ mod tests {
     use link::row_names::{Board, Row};
     use link::{LinkError, Wire};
     use rig::ScriptedBoard;
-    use std::io::Read;
+    use std::io::{ErrorKind, Read};
     use std::sync::atomic::{AtomicBool, Ordering};
     use std::sync::{Arc, mpsc};
     use std::thread;
@@ -328,20 +342,48 @@ mod tests {
         assert!(output.contains("state=park"), "{output}");
     }
 
-    #[test]
-    fn a_hold_goes_before_an_answer_that_does_not_come() {
-        let board = ScriptedBoard::plugged_in();
+    /// An output that fails this way.
+    struct Failing(ErrorKind);
+
+    impl Write for Failing {
+        fn write(&mut self, _: &[u8]) -> io::Result<usize> {
+            Err(self.0.into())
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    /// A session with this board and this input.
+    fn talk(board: &ScriptedBoard, input: &[&str], output: &mut impl Write) -> Result<Finding> {
         let port = board.clone();
         let open: Opener =
             Box::new(move || Ok(Wire::over(port.open().ok_or(LinkError::Absent("it".to_owned()))?, false)));
         let (rows, chosen) = only_row(open);
         let (sender, commands) = mpsc::sync_channel(9);
-        for (number, text) in (1..).zip(["clear", "silence", "clear", "Hold!"]) {
-            sender.send(Line { number, text: text.to_owned() }).unwrap();
+        for (number, text) in (1..).zip(input) {
+            sender.send(Line { number, text: (*text).to_owned() }).unwrap();
         }
         drop(sender);
-        let ended = Talk::new(&rows, &[true], &chosen, None).run(&commands, &mut Vec::new());
-        assert!(ended.is_err());
+        Talk::new(&rows, &[true], &chosen, None).run(&commands, output)
+    }
+
+    #[test]
+    fn a_hold_is_typed_though_nothing_can_be_printed() {
+        // A reader that has closed the pipe has read enough.
+        for (kind, finding) in [(ErrorKind::BrokenPipe, Some(Finding::Good)), (ErrorKind::StorageFull, None)] {
+            let board = ScriptedBoard::plugged_in();
+            let ended = talk(&board, &["get k", "hold"], &mut Failing(kind));
+            assert_eq!(ended.ok(), finding, "{kind}");
+            assert_eq!(board.typed()[..3], ["events on", "get k", "hold"]);
+        }
+    }
+
+    #[test]
+    fn a_hold_goes_before_an_answer_that_does_not_come() {
+        let board = ScriptedBoard::plugged_in();
+        assert!(talk(&board, &["clear", "silence", "clear", "Hold!"], &mut Vec::new()).is_err());
         assert_eq!(board.typed()[..4], ["events on", "clear", "silence", "hold"]);
         assert!(!board.typed()[4..].contains(&"clear".to_owned()));
     }

@@ -2,26 +2,43 @@
 
 use super::model::{Model, RowModel};
 use super::{addressed, view};
+use crate::ctrl_c;
 use crate::record::Logs;
 use anyhow::{Context, Result};
 use link::rows::{Hold, Rows, What};
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 use std::io::{self, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// Time between two reads of the keyboard. After each, the screen is drawn again.
 const TURN: Duration = Duration::from_millis(20);
 
-/// Watches until Ctrl-C or Ctrl-D. Fails if the terminal or a log fails.
+/// Longest wait for a key. With 0, the reader would not look for one.
+const LOOK: Duration = Duration::from_micros(100);
+
+/// Longest wait at the end for the answers to a HOLD.
+const LAST_HOLD: Duration = Duration::from_secs(2);
+
+/// Watches until Ctrl-C or Ctrl-D, or a signal to end. Fails if the terminal or a log fails.
 pub fn run(rows: &Rows, names: Vec<String>, mut logs: Option<Logs>) -> Result<()> {
+    let stop = ctrl_c()?;
     let mut terminal = ratatui::try_init().context("the terminal cannot be drawn on: --plain does without")?;
-    let result = watch(&mut terminal, rows, Model::new(names), &mut logs);
-    ratatui::restore();
+    let result = watch(&mut terminal, rows, Model::new(names), &mut logs, &stop);
+    // The terminal may be gone.
+    let _ = ratatui::try_restore();
     result.and_then(|()| logs.map_or(Ok(()), |logs| logs.check()))
 }
 
-fn watch(terminal: &mut DefaultTerminal, rows: &Rows, mut model: Model, logs: &mut Option<Logs>) -> Result<()> {
+fn watch(
+    terminal: &mut DefaultTerminal,
+    rows: &Rows,
+    mut model: Model,
+    logs: &mut Option<Logs>,
+    stop: &AtomicBool,
+) -> Result<()> {
+    let mut stopped_at = None;
     loop {
         let until = Instant::now() + TURN;
         while let Some(heard) = rows.next(until.saturating_duration_since(Instant::now())) {
@@ -33,15 +50,20 @@ fn watch(terminal: &mut DefaultTerminal, rows: &Rows, mut model: Model, logs: &m
             }
             model.take(heard);
         }
+        // The process would end before a HOLD is typed that came with Ctrl-C.
+        let has_held = model.hold.as_ref().is_none_or(Hold::is_over);
+        if stop.load(Ordering::Relaxed)
+            && (has_held || stopped_at.get_or_insert_with(Instant::now).elapsed() > LAST_HOLD)
+        {
+            return Ok(());
+        }
         model.turn(Instant::now());
         terminal.draw(|frame| view::draw(&model, frame))?;
         ring(&mut model, terminal.backend_mut())?;
-        while event::poll(Duration::ZERO)? {
+        while !stop.load(Ordering::Relaxed) && event::poll(LOOK)? {
             let Event::Key(key) = event::read()? else { continue };
-            if ends(key) {
-                return Ok(());
-            }
             take_key(&mut model, rows, key);
+            stop.fetch_or(ends(key), Ordering::Relaxed);
         }
     }
 }
@@ -56,14 +78,20 @@ fn ring(model: &mut Model, mut terminal: impl Write) -> io::Result<()> {
 }
 
 /// Handles a key. Esc comes before all others, even while a command is being typed. It also clears the half-typed line,
-/// which would otherwise stand before the next command.
-fn take_key(model: &mut Model, rows: &Rows, key: KeyEvent) {
+/// which would otherwise stand before the next command. Esc and a key that comes at once behind it look like Alt and
+/// that key: ssh and tmux join them.
+fn take_key(model: &mut Model, rows: &Rows, mut key: KeyEvent) {
+    if key.kind == KeyEventKind::Release {
+        return;
+    }
+    // Windows sends Esc as a key, and AltGr as Ctrl and Alt.
+    let is_alt_gr = cfg!(windows) && key.modifiers.contains(KeyModifiers::CONTROL);
+    if key.code == KeyCode::Esc || key.modifiers.contains(KeyModifiers::ALT) && !is_alt_gr {
+        model.line.clear();
+        hold_all(model, rows);
+        key.modifiers.remove(KeyModifiers::ALT);
+    }
     match key.code {
-        _ if key.kind == KeyEventKind::Release => {}
-        KeyCode::Esc => {
-            model.line.clear();
-            hold_all(model, rows);
-        }
         KeyCode::PageUp if model.are_several() => model.choose(false),
         KeyCode::PageDown if model.are_several() => model.choose(true),
         KeyCode::PageUp => model.pager.back(model.lines.len()),
@@ -133,6 +161,18 @@ mod tests {
         let summary = model.hold.as_ref().map(|hold| hold.summary(&model.names()));
         assert_eq!(summary.as_deref(), Some("HOLD 0 of 2; NOT THERE: left, right"));
         assert_eq!((&*model.line.text, model.target), ("", Some(0)), "it does not stand before the next command");
+        for (code, modifiers, line) in [
+            (KeyCode::Enter, KeyModifiers::ALT, ""),
+            (KeyCode::Char('h'), KeyModifiers::ALT, "h"),
+            (KeyCode::Esc, KeyModifiers::ALT, ""),
+            #[cfg(unix)]
+            (KeyCode::Char('c'), KeyModifiers::ALT | KeyModifiers::CONTROL, ""),
+        ] {
+            model.hold = None;
+            typed(&mut model, &rows, "k");
+            take_key(&mut model, &rows, KeyEvent::new(code, modifiers));
+            assert_eq!((&*model.line.text, model.hold.is_some()), (line, true), "{code:?} comes with Esc");
+        }
         // The word `hold`, typed to all rows, does the same.
         (model.hold, model.target) = (None, None);
         typed(&mut model, &rows, "hold\n");
