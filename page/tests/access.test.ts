@@ -229,6 +229,16 @@ async function assertReadable(page: Page, panel: string, names: readonly string[
 test("state, reason, alarm and HOLD have a contrast of 7 to 1 and more in each state, light, dark, and made light", async () => {
     const alone = await open(browser, "work");
     await assertReadable(alone.page, "#work-panel", ["state", "why", "hold"]);
+    // As above several machines of `weeder serve`.
+    const states = ["none", "unknown", "hold", "work", "alarm"];
+    await alone.page.evaluate((states) => {
+        const row = (state: string) =>
+            `<li><span class="overview-state" data-state="${state}" data-part="row-${state}">${state}</span></li>`;
+        const overview = `<section class="overview"><ul>${states.map(row).join("")}</ul></section>`;
+        document.querySelector("#work-panel")?.insertAdjacentHTML("beforeend", overview);
+    }, states);
+    const rows = states.map((state) => `row-${state}`);
+    await assertReadable(alone.page, "#work-panel", rows);
     await close(alone);
     const opened = await tryIt(browser);
     const { page } = opened;

@@ -41,6 +41,11 @@ test("a log of the page is drawn with what was seen, kept free and worked, led t
     const saved = tried.page.waitForEvent("download");
     await part(tried.page, "log-save").click();
     await (await saved).saveAs("build/files/look.csv");
+    // A new log drops nothing: what came since is saved first.
+    await part(tried.page, "hold").click();
+    const savedFirst = tried.page.waitForEvent("download");
+    await part(tried.page, "log-clear").click();
+    await savedFirst;
     await close(tried);
 
     const log = readFileSync("build/files/look.csv", "utf8");

@@ -22,6 +22,14 @@ test("a phone is paired by the code, sees the machine, and holds it", async (tes
     const opened = await openAt(browser, served.lan, PHONE);
     const { page } = opened;
     await inspect(page, "phone-pair");
+    // As in a browser that keeps no cookie.
+    await page.route("**/pair", (route) => route.fulfill({ status: 204 }));
+    await page.getByLabel("The code on the computer's screen").fill("K7PM-2F9X");
+    await page.getByRole("button", { name: "Pair this phone" }).click();
+    await page.getByText("This browser keeps no cookies.").waitFor();
+    await page.unroute("**/pair");
+    // The browser itself writes that down.
+    opened.errors.splice(0);
     await page.getByLabel("The code on the computer's screen").fill(served.code.toLowerCase());
     await page.getByRole("button", { name: "Pair this phone" }).click();
 
@@ -125,6 +133,22 @@ test("the address with the code pairs by itself, and machines side by side are s
         assert.equal(await part(shown, "right", "settings-list").locator('[data-setting="k"]').inputValue(), "5");
     }
     await close(late);
+
+    // A browser has six connections to a computer: of its tabs, those behind the one in front do not listen.
+    const hide = (hidden: boolean) =>
+        here.page.evaluate((hidden) => {
+            Object.defineProperty(document, "hidden", { value: hidden, configurable: true });
+            document.dispatchEvent(new Event("visibilitychange"));
+        }, hidden);
+    await hide(true);
+    assert.equal(await part(here.page, "left", "state").textContent(), "hold");
+    const front = await here.page.context().newPage();
+    await front.goto(served.here);
+    await part(here.page, "left", "why").filter({ hasText: "No machine is connected." }).waitFor();
+    await part(front, "left", "state").filter({ hasText: "hold" }).waitFor();
+    await front.close();
+    await hide(false);
+    await part(here.page, "left", "state").filter({ hasText: "hold" }).waitFor();
 
     // All of them at once, at a glance.
     const all = page.getByRole("region", { name: "all rows" });

@@ -205,6 +205,17 @@ test("a machine that is lost at work weeds on, also when its absence is told aga
     assert(!shown.why.includes("weeds on"), shown.why);
 });
 
+test("a page that comes later shows a warning too, and that no plants come until any detection", () => {
+    const shown = new Machine();
+    machine.onHappening = (happening) => shown.take(happening, 0);
+    machine.tell({ ...THERE, warning: "warning name=no_plants" });
+    assert.equal(shown.warning, "no_plants");
+    machine.tell({ is: "event", said: "unknown pos=9 votes=0 spacing=8 delay=7 hold=3 actuation=10" });
+    assert.equal(shown.warning, undefined);
+    machine.tell({ ...THERE, warning: null });
+    assert.equal(shown.warning, undefined);
+});
+
 test("after a new start of weeder serve the page loads itself again, unless that would drop a log", async (test) => {
     let [status, reloads] = [200, 0];
     const told: { error?: () => void; due?: () => void } = {};

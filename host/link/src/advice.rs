@@ -30,7 +30,7 @@ pub fn alarm(alarm: Alarm) -> &'static str {
         Alarm::CropUnknown => "crop? `label plant`; weeds? `misfit_after`; else as 1-2",
         Alarm::ToolStuck => "stop; look for a stone, a dead servo, a loose switch",
         Alarm::SettingsLost => "check `get`, set what differs, `save`, `clear`",
-        Alarm::SettingsContradict => "`start` says which; change one of them, `save`",
+        Alarm::SettingsContradict => "`clear`; `start` says which; change one, `save`",
         Alarm::StackLow => "tell the developers what you did; a reset clears it",
     }
 }

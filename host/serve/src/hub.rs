@@ -6,6 +6,7 @@
 use super::knowledge::Knowledge;
 use link::moment::Moment;
 use link::session::Unanswered;
+use link::{EventLine, Mode};
 use parking_lot::Mutex;
 use serde_json::{Value, json};
 use std::sync::Arc;
@@ -65,12 +66,16 @@ impl Hub {
         news["machine"] = machine.into();
         let mut state = self.state.lock();
         self.send(&mut state, &news);
+        let known = &mut state.machines[machine];
         match news["is"].as_str().unwrap_or_default() {
-            "there" | "lost" => state.machines[machine] = news,
+            "there" | "lost" => *known = news,
             "restarted" => state.restarted[machine] = Some(news),
-            what @ ("status" | "settings" | "examples") if state.machines[machine]["is"] == "there" => {
-                state.machines[machine][what] = news["said"].clone();
-            }
+            what @ ("status" | "settings" | "examples") if known["is"] == "there" => known[what] = news["said"].clone(),
+            "event" => match EventLine::parse(news["said"].as_str().unwrap_or_default()) {
+                Some(EventLine::Warning { .. }) => known["warning"] = news["said"].clone(),
+                Some(event) if ends_warning(event, &known["warning"]) => known["warning"] = Value::Null,
+                _ => {}
+            },
             _ => {}
         }
     }
@@ -126,6 +131,15 @@ impl Hub {
     }
 }
 
+/// Whether an event ends a warning, as in page/src/panel/machine.ts.
+fn ends_warning(event: EventLine, warning: &Value) -> bool {
+    match event {
+        EventLine::State { mode } => mode == Mode::Hold,
+        EventLine::Detection { .. } => warning == "warning name=no_plants",
+        _ => false,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -172,5 +186,23 @@ mod tests {
         let heard: Vec<Value> = std::iter::from_fn(|| later.try_recv().ok()).map(|message| read(&message)).collect();
         assert_eq!(heard, expected);
         assert_eq!(hub.why_lost(0).as_deref(), Some("pulled"));
+    }
+
+    #[test]
+    fn a_new_page_gets_a_warning_until_hold_and_that_no_plants_come_until_a_detection() {
+        let hub = Hub::new(1, 5000, Box::new(Moment::now));
+        hub.news(0, json!({ "is": "there" }));
+        let detection = "unknown pos=9 votes=0 spacing=8 delay=7 hold=3 actuation=10";
+        for (said, warning) in [
+            ("warning name=no_plants", json!("warning name=no_plants")),
+            ("state is=work", json!("warning name=no_plants")),
+            (detection, Value::Null),
+            ("warning name=late_command", json!("warning name=late_command")),
+            (detection, json!("warning name=late_command")),
+            ("state is=hold", Value::Null),
+        ] {
+            hub.news(0, json!({ "is": "event", "said": said }));
+            assert_eq!(read(&hub.listen().0[0])["warning"], warning, "{said}");
+        }
     }
 }

@@ -285,6 +285,8 @@ async fn serve(stream: TcpStream, routes: Router) {
         .timer(TokioTimer::new())
         .header_read_timeout(HEAD_TIME)
         .max_buf_size(HEAD_BYTES)
+        // A HOLD whose client ends with it is obeyed all the same.
+        .half_close(true)
         .serve_connection(TokioIo::new(Box::pin(stream)), TowerToHyperService::new(routes));
     // Errors are ignored: the page connects again.
     let _ = connection.await;

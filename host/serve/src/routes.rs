@@ -166,10 +166,17 @@ async fn front(State(served): State<Arc<Served>>, Extension(visitor): Extension<
     if visitor.known.is_none() {
         return Html(include_str!("pair/pair.html")).into_response();
     }
-    // This tells the page that it is connected to a machine.
-    match uri.query() {
-        Some("served") => Html(served.page.0[0].clone()).into_response(),
-        _ => (StatusCode::SEE_OTHER, [(LOCATION, "/?served#work")]).into_response(),
+    match redirect(uri.query().unwrap_or_default()) {
+        None => Html(served.page.0[0].clone()).into_response(),
+        Some(address) => (StatusCode::SEE_OTHER, [(LOCATION, address)]).into_response(),
+    }
+}
+
+/// The page's address, if a query lacks `served`. That word tells the page that it is connected to a machine.
+fn redirect(query: &str) -> Option<String> {
+    match query {
+        "" => Some("/?served#work".to_owned()),
+        query => query.split('&').all(|part| part != "served").then(|| format!("/?served&{query}")),
     }
 }
 
@@ -191,7 +198,9 @@ async fn pair(
             };
             let paired = served.pairing.lock().pair(token);
             (served.tell)(&format!("{address} is paired now. Paired in all: {paired}."));
-            let cookie = format!("{}={}; HttpOnly; SameSite=Strict; Path=/", door.cookie, hex::encode(token));
+            // A phone's browser that ends drops a cookie without an age. The token ends with this process.
+            let rules = "HttpOnly; SameSite=Strict; Path=/; Max-Age=31536000";
+            let cookie = format!("{}={}; {rules}", door.cookie, hex::encode(token));
             (StatusCode::NO_CONTENT, [(SET_COOKIE, cookie)]).into_response()
         }
         Try::Wrong { left: 0 } => {
@@ -373,6 +382,19 @@ mod tests {
         for (port, token) in [(8866, "one"), (8867, "other")] {
             let door = Door::lan(Ipv4Addr::LOCALHOST, port, false);
             assert_eq!(cookies(&headers, &door.cookie).collect::<Vec<_>>(), [token]);
+        }
+    }
+
+    #[test]
+    fn an_address_keeps_its_own_words_beside_the_mark_of_a_served_page() {
+        for (query, address) in [
+            ("", Some("/?served#work")),
+            ("seed=7", Some("/?served&seed=7")),
+            ("served", None),
+            ("served&seed=7", None),
+            ("seed=7&served", None),
+        ] {
+            assert_eq!(redirect(query).as_deref(), address, "{query}");
         }
     }
 

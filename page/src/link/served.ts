@@ -44,7 +44,7 @@ export function isServed(): boolean {
 }
 
 /** News of a machine. */
-type About = News | { is: "lost"; why: string };
+type About = News | { is: "lost"; why: string; isWanted?: boolean };
 
 type Message = (About & { machine: number }) | { is: "beat" | "dropped" | "held" };
 
@@ -69,6 +69,7 @@ export class Served {
     readonly machines: readonly ServedMachine[];
     /** Whether the page may load itself again: no log is lost by that. */
     mayReload = () => true;
+    #isBehind = false;
     #events: EventSource | undefined;
     #heardMs = 0;
     /** The number of the last message. */
@@ -101,6 +102,15 @@ export class Served {
         events.addEventListener("error", () => this.#lose(SILENT));
     }
 
+    /**
+     * Whether another tab of this browser listens instead. A browser has six connections to a computer, and HOLD needs
+     * one.
+     */
+    set isBehind(isBehind: boolean) {
+        this.#isBehind = isBehind;
+        if (isBehind) this.#lose(english("noneConnected"), true);
+    }
+
     /** Holds all machines, before all waiting commands. */
     async holdAll(): Promise<HeldAll> {
         if (this.machines.some(({ isOther }) => isOther)) throw new Error(english("servedOther"));
@@ -119,16 +129,16 @@ export class Served {
         else if (message.is !== "held" && "machine" in message) this.machines[message.machine]?.tell(message);
     }
 
-    #lose(why: string): void {
+    #lose(why: string, isWanted = false): void {
         if (!this.#events) return;
         this.#events.close();
         this.#events = undefined;
-        this.#tellLost(why);
+        this.#tellLost(why, isWanted);
         setTimeout(() => void this.#again(), RETRY_MS);
     }
 
-    #tellLost(why: string): void {
-        for (const machine of this.machines) machine.tell({ is: "lost", why });
+    #tellLost(why: string, isWanted = false): void {
+        for (const machine of this.machines) machine.tell({ is: "lost", why, isWanted });
     }
 
     async #again(): Promise<void> {
@@ -140,7 +150,7 @@ export class Served {
             for (const machine of this.machines) machine.isOther = true;
             this.#tellLost(english("servedOther"));
         } else if (isOther) location.reload();
-        else if (answer?.isOk) this.listen();
+        else if (answer?.isOk && !this.#isBehind) this.listen();
         else setTimeout(() => void this.#again(), RETRY_MS);
     }
 }
@@ -189,16 +199,16 @@ export class ServedMachine implements Link {
     /** Takes the computer's news of it. */
     tell(message: About): void {
         if (message.is === "lost") {
-            this.#lose(message.why);
+            this.#lose(message.why, message.isWanted);
             return;
         }
         if (message.is === "there") this.#there = new AbortController();
         tell(message, (happening) => this.onHappening(happening));
     }
 
-    #lose(why: string): void {
+    #lose(why: string, isWanted = false): void {
         this.#there?.abort(new NoMachine(english("mayBeDone", { why })));
-        if (this.#there) this.onHappening({ is: "lost", why, forGood: true, isWanted: false });
+        if (this.#there) this.onHappening({ is: "lost", why, forGood: true, isWanted });
         else this.onAbsent(why);
         this.#there = undefined;
     }

@@ -80,6 +80,8 @@ export type News =
           examples: readonly string[];
           help: Readonly<Record<string, string>>;
           status?: string;
+          /** The event line of a warning that has not ended. */
+          warning?: string | null;
       }
     | { is: "settings" | "examples"; said: readonly string[] }
     | { is: "status" | "event"; said: string }
@@ -90,10 +92,11 @@ export type News =
 export function tell(news: News, onHappening: (happening: Happening) => void): void {
     switch (news.is) {
         case "there": {
-            const { version, examples, status } = news;
+            const { version, examples, status, warning } = news;
             const help = new Map(Object.entries(news.help));
             onHappening({ is: "connected", version, settings: linesOf("setting", news.settings), examples, help });
             if (status !== undefined) tell({ is: "status", said: status }, onHappening);
+            if (warning) tell({ is: "event", said: warning }, onHappening);
             break;
         }
         case "settings":

@@ -120,7 +120,7 @@ export class Machine {
             case "detection":
                 this.objects = [event, ...this.objects].slice(0, OBJECTS);
                 this.zones = [event, ...this.zones].slice(0, OBJECTS);
-                if (event.class === "plant" && this.warning === "no_plants") this.warning = undefined;
+                if (this.warning === "no_plants") this.warning = undefined;
                 break;
             case "state":
                 this.mode = event.mode;

@@ -81,8 +81,10 @@ export class Panel {
         const why = (error: unknown) => sentence(told(error));
         for (const command of ["start", "clear"])
             parts.button(command, () => void parts.attempt("drive-said", ask(command), undefined, why));
-        parts.button("log-save", () => download("weeder-log.csv", this.#log.text(), "text/csv"));
+        const save = () => download("weeder-log.csv", this.#log.text(), "text/csv");
+        parts.button("log-save", save);
         parts.button("log-clear", () => {
+            if (this.#log.isUnsaved) save();
             this.#log = new Log();
             const { version, settings, examples, help } = this.machine;
             // So that the later lines can be replayed by themselves.

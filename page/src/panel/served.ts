@@ -51,6 +51,17 @@ export async function showServed(into: HTMLElement): Promise<Panel[]> {
         for (const panel of panels) panel.turn(performance.now());
         showAll?.(panels);
     }, TURN_MS);
+    const tabs = new BroadcastChannel("served");
+    tabs.onmessage = () => {
+        served.isBehind = document.hidden;
+    };
+    const comeToFront = () => {
+        if (document.hidden) return;
+        served.isBehind = false;
+        tabs.postMessage("");
+    };
+    document.addEventListener("visibilitychange", comeToFront);
+    comeToFront();
     served.listen();
     return panels;
 }

@@ -7,9 +7,10 @@ const said = document.querySelector("[role=status]");
 async function pair(code) {
     try {
         const answer = await fetch("/pair", { method: "POST", body: code });
+        if (!answer.ok) said.textContent = await answer.text();
         // So that the code does not stay in the address.
-        if (answer.ok) location.replace("/?served#work");
-        else said.textContent = await answer.text();
+        else if ((await fetch("/machines")).ok) location.replace("/?served#work");
+        else said.textContent = "This browser keeps no cookies. Allow them for this address, or use another browser.";
     } catch {
         said.textContent = "The computer does not answer: see that this phone is in its network, and try again.";
     }

@@ -4,7 +4,7 @@
 
 use super::*;
 use std::collections::VecDeque;
-use std::net::Ipv4Addr;
+use std::net::{Ipv4Addr, Shutdown};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Addresses of the attackers.
@@ -204,6 +204,8 @@ fn a_new_hold_is_read_although_a_crowd_of_half_open_connections_comes_with_it() 
         let mut client = BufReader::new(connect(host, 0));
         let hold = request(host, cookie, "POST", "/machines/0/command", "Content-Length: 4\r\n\r\nhold");
         client.get_mut().write_all(hold.as_bytes()).expect("it is connected");
+        // Its client sends nothing more, as one that gives up or ends.
+        client.get_mut().shutdown(Shutdown::Write).expect("it is connected");
         crowd.extend((100..250).map(half_open));
         signal("-CONT");
         assert_eq!(answer(&mut client), (200, "ok\n".to_owned()));

@@ -187,7 +187,7 @@ impl Served {
         assert_eq!(status, 204, "{said}");
         let cookie = cookie.expect("it is paired");
         let (token, rules) = cookie.split_once("; ").expect("it has rules");
-        assert_eq!(rules, "HttpOnly; SameSite=Strict; Path=/");
+        assert_eq!(rules, "HttpOnly; SameSite=Strict; Path=/; Max-Age=31536000");
         token.to_owned()
     }
 
