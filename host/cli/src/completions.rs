@@ -13,7 +13,8 @@ use frame::{print, program};
 Examples:
   source <(weeder completions bash)    as a line of ~/.bashrc
   weeder completions zsh > ~/.zfunc/_weeder    if ~/.zfunc is in fpath before compinit
-  weeder completions fish > ~/.config/fish/completions/weeder.fish")]
+  weeder completions fish > ~/.config/fish/completions/weeder.fish
+  weeder completions powershell | Out-String | Invoke-Expression    as a line of $PROFILE")]
 pub struct Arguments {
     /// The shell.
     shell: Shell,

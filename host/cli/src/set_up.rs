@@ -215,7 +215,7 @@ impl Guide {
             say!("  Warning: {warning}")?;
         }
         let width_mm = self.tool_width_mm().context("the tool's width was not given in step 3");
-        let expected = width_mm.and_then(|width_mm| simulated::expected(&settings, width_mm));
+        let expected = width_mm.and_then(|width_mm| simulated::expected(&settings, width_mm, &self.state.measured));
         say!("  Expected: {}", expected.unwrap_or_else(|error| format!("not calculated, because {error:#}")))?;
         say!("  The measurements are in {}.", self.path.display())?;
         say!("  Next, read docs/work.md (in a release: manual/docs/work.md).")
@@ -295,11 +295,19 @@ impl Guide {
                 Task::SetMargin => self.set_margin()?,
             }
         }
+        // A long lead comes with a lower top speed, which is not in the tasks.
+        let mut to_set: Vec<Setting> = calculated.iter().map(|&(setting, _)| setting).collect();
+        for task in tasks {
+            if let Task::Set(setting, _) = *task
+                && !to_set.contains(&setting)
+            {
+                to_set.push(setting);
+            }
+        }
         // Until they do not contradict the others.
         loop {
             let mut wanted = Vec::new();
-            for task in tasks {
-                let Task::Set(setting, _) = *task else { continue };
+            for &setting in &to_set {
                 let offered = calculated.iter().find(|(offered, _)| *offered == setting).map(|&(_, value)| value);
                 wanted.push((setting, self.value(setting, offered)?));
             }

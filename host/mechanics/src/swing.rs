@@ -4,7 +4,8 @@
 //! torque-speed line. A shorter stroke takes less time and leaves more ground weeded. With a stem zone, its settings
 //! follow as well. The zone is longer than the protected width, because a stem may stand off the middle. Its leads are
 //! shorter, by what its circle allows at the top speed. The margin covers a wheel and a servo that were not measured yet.
-//! Top speed and gap between pulses are the board's, or the firmware's defaults.
+//! Top speed and gap between pulses are the board's, or the firmware's defaults. If the lead is too long for the beam's
+//! distance, the top speed is lowered.
 //!
 //! The arm swings sideways about a pivot beside the row: at an angle the tool's middle is `arm * sin(angle)` from the
 //! row's line. A servo turns at full speed without load. Its speed falls in a straight line to zero at the stall
@@ -12,7 +13,7 @@
 
 use crate::machine::{Machine, SwingInputs};
 use crate::unit::{KG_CM, MM};
-use link::settings::{Setting, Settings, name};
+use link::settings::{Setting, Settings, explain, name};
 use serde::Serialize;
 use set_up::{circle, saved_ms};
 use uom::si::f64::{Time, Torque};
@@ -44,6 +45,8 @@ pub struct Swing {
     pub unloaded_ms: f64,
     /// Its time against the soil, ms.
     pub loaded_ms: f64,
+    /// A lower top speed, mm/s, at which the beam sees a plant early enough for the lead. `None` if none is needed.
+    pub top_speed_mm_s: Option<u32>,
     /// Lead of the command to leave the row, ms.
     pub lead_out_ms: u32,
     /// Lead of the command to come back, ms.
@@ -62,7 +65,7 @@ impl Swing {
     /// The swing of a machine, whose servo turns against this torque.
     ///
     /// # Errors
-    /// If the arm is too short, or the servo too weak or too slow, in words.
+    /// If the arm is too short, the servo too weak or too slow, or the beam too near, in words.
     pub fn of(machine: &Machine, torque: Torque) -> Result<Self, String> {
         Self::fitted(machine, torque, &Settings::new())
     }
@@ -135,19 +138,28 @@ impl Swing {
         let out_us = if is_longer { in_us + stroke_us } else { in_us - stroke_us };
         let lead_out_ms = (lead_out_ms - saved_out_ms).ceil().max(0.0);
         let lead_in_ms = (dead_ms(inputs.least_dead_time.min(inputs.most_dead_time)) + saved_in_ms).floor();
+        let mut after = settings.clone();
         for (setting, value, advice) in [
+            (Setting::ServoInUs, in_us, "fit the tool at another one"),
             (Setting::ServoOutUs, out_us, "take a longer arm, or fit the tool at another servo_in_us"),
             (Setting::LeadOutMs, lead_out_ms, "take a faster or a stronger one"),
             (Setting::LeadInMs, lead_in_ms, "take one with a shorter dead time"),
         ] {
-            let (name, range) = (name(setting), setting.description());
-            let (least, greatest) = (range.least, range.greatest);
-            if !(f64::from(least)..=f64::from(greatest)).contains(&value) {
+            // `as` saturates: a negative pulse becomes 0, which is out of range.
+            if after.set(setting, value as u16).is_err() {
+                let (name, least, greatest) = (name(setting), setting.least(), setting.greatest());
                 return Err(format!(
                     "the servo needs {name} {value}, and the firmware takes {least} to {greatest}: {advice}"
                 ));
             }
         }
+        let board_mm_s = settings.get(Setting::TopSpeedMmS);
+        let allowed_mm_s = (Setting::TopSpeedMmS.least()..=board_mm_s).rev().find(|&mm_s| {
+            // It is at most the board's, and in its range.
+            let _ = after.set(Setting::TopSpeedMmS, mm_s);
+            after.contradiction().is_none()
+        });
+        let allowed_mm_s = allowed_mm_s.ok_or_else(|| after.contradiction().map(explain).unwrap_or_default())?;
         let (arm_margin_mm, lift_mm) = if inputs.arm_trails > 0 { (carried_mm, 0.0) } else { (0.0, stroke_mm) };
         Ok(Self {
             stem_zone_mm: stem_zone_mm.ceil() as u32,
@@ -157,6 +169,7 @@ impl Swing {
             load,
             unloaded_ms,
             loaded_ms,
+            top_speed_mm_s: (allowed_mm_s < board_mm_s).then_some(allowed_mm_s.into()),
             lead_out_ms: lead_out_ms as u32,
             lead_in_ms: lead_in_ms as u32,
             arm_margin_mm: arm_margin_mm.ceil() as u32,
@@ -169,9 +182,11 @@ impl Swing {
     /// The settings that follow.
     pub fn settings(&self) -> Vec<(&'static str, u32)> {
         let pulses = [("servo_in_us", self.servo_in_us), ("servo_out_us", self.servo_out_us)];
+        let slower = self.top_speed_mm_s.map(|mm_s| ("top_speed_mm_s", mm_s));
         let leads = [("lead_out_ms", self.lead_out_ms), ("lead_in_ms", self.lead_in_ms)];
         let zone = (self.stem_zone_mm > 0).then_some(("stem_zone_mm", self.stem_zone_mm));
-        pulses.into_iter().chain(leads).chain(zone).collect()
+        // A lower speed comes before the lead that needs it.
+        pulses.into_iter().chain(slower).chain(leads).chain(zone).collect()
     }
 
     /// The same as lines for the firmware's console.
@@ -196,6 +211,9 @@ impl Swing {
                 100.0 * self.load
             ),
         ];
+        said.extend(self.top_speed_mm_s.map(|mm_s| {
+            format!("With this lead, the beam is far enough ahead up to {mm_s} mm/s. A beam farther ahead allows more.")
+        }));
         said.push(if self.arm_margin_mm > 0 {
             format!(
                 "The trailing arm carries the tool towards the plant, so the margin is {} mm wider: `weeder set-up --machine` adds them.",
@@ -308,6 +326,29 @@ mod tests {
         let (out_ms, in_ms) = leads(&machine, Setting::TopSpeedMmS, 1300);
         let (fast_out_ms, fast_in_ms) = leads(&machine, Setting::TopSpeedMmS, 2000);
         assert!(fast_out_ms > out_ms && fast_in_ms < in_ms, "{fast_out_ms} {fast_in_ms}");
+    }
+
+    #[test]
+    fn the_firmware_takes_each_line_and_a_long_lead_comes_with_the_highest_speed_for_it() {
+        // The soil's torque on the paper's blade, and on one of 2.5 mm.
+        for (kg_cm, is_slower) in [(39.4, true), (10.0, false)] {
+            let swing = Swing::of(&Machine::default(), KG_CM.of(kg_cm)).expect("it swings");
+            let mut settings = Settings::new();
+            for (name, value) in swing.settings() {
+                let setting = Setting::find(name.as_bytes()).expect("it is a setting");
+                settings.change(setting, value as u16).expect("it is in its range");
+                assert_eq!(settings.contradiction(), None, "{name} {value}");
+            }
+            assert_eq!(swing.top_speed_mm_s.is_some(), is_slower, "{swing:?}");
+            let faster_mm_s = settings.get(Setting::TopSpeedMmS) + 1;
+            settings.set(Setting::TopSpeedMmS, faster_mm_s).expect("it is in its range");
+            assert!(!is_slower || settings.contradiction().is_some(), "{faster_mm_s}");
+        }
+        let mut near = Settings::new();
+        near.set(Setting::BeamToToolMm, 100).expect("it is in its range");
+        near.set(Setting::MarginMm, 90).expect("it is in its range");
+        let error = Swing::fitted(&Machine::default(), KG_CM.of(39.4), &near).expect_err("it is refused");
+        assert!(error.contains("together need a beam_to_tool_mm of "), "{error}");
     }
 
     #[test]

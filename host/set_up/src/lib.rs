@@ -161,7 +161,11 @@ impl SetUp {
             Ok(Command { action: Action::Calibrate, .. }) => self.measures_the_wheel = true,
             Ok(Command { action: Action::Set, setting: Setting::MarginMm, .. }) => self.sets_margin = true,
             // The measurements begin again.
-            Ok(Command { action: Action::Set, setting: Setting::TicksPerM, number: 0, .. }) => self.ticks_per_m.clear(),
+            Ok(Command { action: Action::Set, setting: Setting::TicksPerM, number, .. })
+                if !self.is_measured(number) =>
+            {
+                self.ticks_per_m.clear();
+            }
             Ok(Command { action: Action::Set, setting, number, .. }) => self.take_seen(setting, number),
             _ => {}
         }
@@ -201,6 +205,12 @@ impl SetUp {
         }
     }
 
+    /// Whether this value lies among the measured ones. Otherwise they were of another wheel.
+    fn is_measured(&self, ticks_per_m: u16) -> bool {
+        let (least, greatest) = (self.ticks_per_m.iter().min(), self.ticks_per_m.iter().max());
+        least <= Some(&ticks_per_m) && Some(&ticks_per_m) <= greatest
+    }
+
     /// The servo's timings over the present stroke and gap.
     fn timed(&self, settings: &Settings) -> Vec<Timing> {
         self.timings.iter().copied().filter(|timing| timing.over == over(settings)).collect()
@@ -222,9 +232,8 @@ impl SetUp {
                 }
             }
         }
-        // Until two plants have measured the slip, only the wheel counts, also with a second beam. If the machine has
-        // no measured value, the measurements were of another wheel.
-        let is_in_use = settings.get(Setting::TicksPerM) > 0;
+        // Until two plants have measured the slip, only the wheel counts, also with a second beam.
+        let is_in_use = self.is_measured(settings.get(Setting::TicksPerM));
         let stretches = if is_in_use { self.ticks_per_m.len() } else { 0 };
         if stretches < Self::STRETCHES {
             missing.push(Step::MeasureWheel(stretches));

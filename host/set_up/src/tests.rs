@@ -61,6 +61,18 @@ fn servo_wheel_and_margin_come_one_after_the_other() {
 }
 
 #[test]
+fn a_wheel_whose_value_in_use_was_not_measured_is_to_be_measured_again() {
+    let set_up = heard(&[TIMED, MEASURED, THIRD]);
+    for (ticks_per_m, missing) in [(1909, Some(0)), (1910, None), (1915, None), (1930, None), (1931, Some(0))] {
+        let missing: Vec<Step> = missing.map(Step::MeasureWheel).into_iter().collect();
+        assert_eq!(set_up.missing(&settings(&worst_leads(Setting::TicksPerM, ticks_per_m))), missing, "{ticks_per_m}");
+    }
+    for (typed, kept) in [("> set ticks_per_m 1915", 3), ("> set ticks_per_m 1500", 0)] {
+        assert_eq!(heard(&[MEASURED, THIRD, &[typed]]).ticks_per_m.len(), kept, "{typed}");
+    }
+}
+
+#[test]
 fn with_a_second_beam_plants_show_the_remaining_slip() {
     let mut changes = worst_leads(Setting::SecondBeamMm, 200);
     assert_eq!(

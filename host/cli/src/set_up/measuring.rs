@@ -150,7 +150,8 @@ impl Guide {
 
     /// Measures the wheel until there are enough measurements.
     pub(super) fn measure_wheel(&mut self, length_mm: u16) -> Result<()> {
-        if settings::read(&mut self.link)?.get(Setting::TicksPerM) == 0 {
+        let settings = settings::read(&mut self.link)?;
+        if self.state.measured.missing(&settings).contains(&Step::MeasureWheel(0)) {
             // They were of another wheel.
             self.state.measured.ticks_per_m.clear();
         }

@@ -57,6 +57,15 @@ fn other_shells_complete_every_command() {
 }
 
 #[test]
+fn the_help_has_a_line_for_each_shell_that_the_manual_names() {
+    let output = Command::new(env!("CARGO_BIN_EXE_weeder")).args(["completions", "--help"]).output();
+    let help = String::from_utf8(output.expect("cargo has built the command").stdout).expect("it is text");
+    for shell in ["bash", "zsh", "fish", "powershell"] {
+        assert!(help.contains(&format!("weeder completions {shell}")), "{shell} is not in {help}");
+    }
+}
+
+#[test]
 fn a_shell_that_is_not_known_is_refused_with_those_that_are() {
     let output = Command::new(env!("CARGO_BIN_EXE_weeder")).args(["completions", "tcsh"]).output();
     let output = output.expect("cargo has built the command");

@@ -411,6 +411,22 @@ fn of_two_timings_by_eye_the_safest_times_are_set_and_one_that_is_left_out_does_
 }
 
 #[test]
+fn a_lead_that_is_too_long_for_the_beam_is_offered_with_a_lower_top_speed() {
+    let folder = TempDir::new().expect("there is room for a folder");
+    let (_uno, _) = uno(folder.path(), &["--stand", "--link", "uno"]);
+    fs::write(folder.path().join("my.toml"), "weeder.mass = \"60 kg\"\n").expect("there is room for a file");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
+    command.current_dir(&folder).args(["set-up", "--port", "./uno", "--machine", "my.toml"]);
+    // Step 5 with the paper's blade: all six offers are taken.
+    let lines = ["", "s", "s", "s", "s", "", "", "", "", "", "", "s", "s", ""].join("\n");
+    let printed = printed(&typed(&mut command, lines), 0);
+    for words in ["top_speed_mm_s in mm/s, now 1300 [", "    lead_out_ms 258 ms\n"] {
+        assert!(printed.contains(words), "{words:?} is not in\n{printed}");
+    }
+    assert!(!printed.contains("error"), "{printed}");
+}
+
+#[test]
 fn a_wheel_that_does_not_turn_is_named_and_the_wait_for_it_can_be_ended() {
     let folder = TempDir::new().expect("there is room for a folder");
     let (_uno, _) = uno(folder.path(), &["--stand", "--link", "uno"]);
