@@ -17,7 +17,7 @@ const REPORT: &str = "report.html";
     weeder evaluate trial.csv                   the results, and what they depend on\n  \
     weeder evaluate trial.csv --out report      also write report/report.html, with plots\n  \
     weeder evaluate trial.csv --speeds 1,1.5,2,2.5   the table has measured speeds\n  \
-    weeder evaluate trial.csv --log row.csv     speed, time, plants and area come from the log of `weeder record`\n  \
+    weeder evaluate trial.csv --log row.csv     speed, time, plants and area come from the machine's log\n  \
     weeder evaluate trial.csv --json | jq .responses[0].model.terms")]
 pub struct Arguments {
     /// CSV file with a line for each plot: replication, speed_km_h, spacing_cm, weeds_before, weeds_after, plants, damaged,
@@ -27,8 +27,8 @@ pub struct Arguments {
     /// Nominal speeds in km/h, 0.1 to 15, where the table has measured ones: means and analysis of variance take the nearest.
     #[arg(long, value_delimiter = ',', value_parser = number_within(0.1..=15.0))]
     speeds: Vec<f64>,
-    /// Log of `weeder record`: each stretch of work is a plot, in the order of the plots' numbers. It gives each plot its
-    /// speed, and fills the empty cells of time, plants and area.
+    /// Log of `weeder monitor --log` or `weeder record`: each stretch of work is a plot, in the order of the plots'
+    /// numbers. It gives each plot its speed, and fills the empty cells of time, plants and area.
     #[arg(long, value_name = "FILE.csv", value_parser = source::file(), conflicts_with = "speeds")]
     log: Option<PathBuf>,
     /// The plot of each stretch of work in the log, 0 to 100000, 0 for none.

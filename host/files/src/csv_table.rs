@@ -18,6 +18,9 @@ pub struct CsvTable {
     path: PathBuf,
     separator: u8,
     header: StringRecord,
+    header_line: u64,
+    /// Where the columns are that every such table has.
+    columns: Vec<usize>,
     lines: Vec<(u64, StringRecord)>,
     /// See [`decimal`](Self::decimal).
     decimal: OnceLock<Option<char>>,
@@ -129,7 +132,24 @@ impl CsvTable {
         if lines.len() < fewest {
             return Err(at(header_line, "no line is below the header: add at least one".to_owned()));
         }
-        Ok(Self { path: path.into(), separator, header, lines, decimal: OnceLock::new() })
+        let columns = columns.iter().filter_map(|column| header.iter().position(|name| name == *column)).collect();
+        Ok(Self { path: path.into(), separator, header, header_line, columns, lines, decimal: OnceLock::new() })
+    }
+
+    /// Checks the columns that a table may lack. A heading such as `Plot no` may mean `plot`.
+    ///
+    /// # Errors
+    /// Names a heading that begins with the name of a missing column.
+    pub fn with_optional(self, columns: &[&str]) -> Result<Self, FileError> {
+        for column in columns.iter().filter(|column| !self.header.iter().any(|name| name == **column)) {
+            if let Some(near) = self.header.iter().find(|name| name.to_lowercase().starts_with(*column)) {
+                let problem = format!(
+                    "the column `{column}` is missing: did you mean {column} by `{near}`? If not, name it otherwise"
+                );
+                return Err(FileError::Line { path: self.path, line: self.header_line, problem });
+            }
+        }
+        Ok(self)
     }
 
     /// The lines below the header. At least one, unless the caller allows none.
@@ -137,11 +157,13 @@ impl CsvTable {
         self.lines.iter().map(|(number, record)| Line { table: self, number: *number, record })
     }
 
-    /// The mark that is certainly decimal in some number: comma or point. `None` if neither is, or both.
+    /// The mark that is certainly decimal in some number of the columns that every such table has: comma or point.
+    /// `None` if neither is, or both.
     fn decimal(&self) -> Option<char> {
         *self.decimal.get_or_init(|| {
-            let marks = self.lines.iter().flat_map(|(_, line)| line).filter_map(mark);
-            let mut decimal = marks.filter(|(_, may_be_thousands)| !may_be_thousands).map(|(mark, _)| mark);
+            let cells = self.lines.iter().flat_map(|(_, line)| self.columns.iter().filter_map(move |&at| line.get(at)));
+            let marks = cells.filter_map(mark).filter(|(_, may_be_thousands)| !may_be_thousands);
+            let mut decimal = marks.map(|(mark, _)| mark);
             let first = decimal.next()?;
             decimal.all(|mark| mark == first).then_some(first)
         })
@@ -229,11 +251,18 @@ fn missing(column: &str, header: &StringRecord, columns: &[&str]) -> String {
     }
 }
 
-/// Whether a cell is a spreadsheet's answer to a formula that failed, such as `#REF!`. It begins no note.
+/// Whether a cell is a spreadsheet's answer to a formula that failed, such as `#REF!`. It begins no note. Most end
+/// with `!` or `?`. "Not available" may be two initials, such as `#N/A` or `#I/T`, or a word. Other words are notes:
+/// `#P7` is a plot that is left out.
 fn is_failed_formula(cell: &str) -> bool {
-    let is_shouted = || !cell.contains(|letter: char| letter.is_lowercase() || letter.is_whitespace());
-    let is_error = || ["#N/A", "#N/D", "#NV"].contains(&cell) || cell.ends_with(['!', '?']);
-    cell.starts_with('#') && is_error() && is_shouted() && cell.contains(char::is_uppercase)
+    /// "Not available" in German, Turkish, Hungarian, Slovak and Czech, and a value that is not loaded.
+    const WORDS: [&str; 6] = ["NV", "YOK", "HIÁNYZIK", "NEDOSTUPNÝ", "NENÍ_K_DISPOZICI", "GETTING_DATA"];
+    let Some(word) = cell.strip_prefix('#') else { return false };
+    let is_shouted = !word.contains(|letter: char| letter.is_lowercase() || letter.is_whitespace());
+    let is_error = word.ends_with(['!', '?']) && is_shouted && word.contains(char::is_uppercase);
+    let letters: Vec<char> = word.chars().collect();
+    let is_initials = matches!(letters[..], [one, '/', other] if one.is_uppercase() && other.is_uppercase());
+    is_error || is_initials || WORDS.contains(&word)
 }
 
 /// The error for a field over several lines: it has a line break, or the lines after an open quotation mark.
@@ -283,7 +312,9 @@ impl Line<'_> {
             Some(_) => None,
         };
         value.ok_or_else(|| {
+            let is_whole = "0.5".parse::<T>().is_err();
             let hint = match unclear {
+                Some(_) if is_whole => "; its comma or point may be one of thousands: leave it out",
                 Some((',', _)) if commas_separate => {
                     "; its comma may be one of thousands: leave it out, or write a point"
                 }

@@ -129,8 +129,8 @@ impl OutFolder {
     }
 }
 
-/// Checks the files of a parsed command line. Fails, in words, if an output is also an input or another output. A `-`
-/// that is left names no file: a parser replaces it where standard input is read.
+/// Checks the files of a parsed command line. Fails, in words, if an output is also an input or another output, or if
+/// standard input is named twice. A `-` that is left names no file: a parser replaces it where standard input is read.
 pub(crate) fn check(words: &ArgMatches) -> Result<(), String> {
     if let Some((_, words)) = words.subcommand() {
         return check(words);
@@ -141,6 +141,9 @@ pub(crate) fn check(words: &ArgMatches) -> Result<(), String> {
     let outputs: Vec<&Path> = values::<OutName>(words).map(OutName::path).collect();
     if inputs.iter().chain(&outputs).any(|path| path.as_os_str() == "-") {
         return Err("- is no file here: name one".to_owned());
+    }
+    if inputs.iter().filter(|path| path.as_os_str() == "/dev/stdin").count() > 1 {
+        return Err("standard input is read once: name - once".to_owned());
     }
     let mut taken: Vec<PathBuf> = inputs.into_iter().map(full).collect();
     for output in outputs {

@@ -132,9 +132,11 @@ impl Recorder {
         lines
     }
 
-    /// The counts so far.
+    /// The counts, if the record ends here.
     pub fn counts(&self) -> crate::receiver::Counts {
-        self.receiver.counts
+        let mut receiver = self.receiver.clone();
+        receiver.end();
+        receiver.counts
     }
 
     fn marks(&mut self) -> impl Iterator<Item = (Kind, String)> {
@@ -167,6 +169,7 @@ mod tests {
             let lines: Lines = stream.as_bytes().chunks(length).flat_map(|piece| recorder.take(10, piece)).collect();
             assert_eq!(kinds(&lines), [Kind::Gps, Kind::GpsDamaged, Kind::GpsDamaged, Kind::Gps], "{length}");
             assert_eq!(lines[0].1, GGA);
+            assert_eq!(recorder.counts().fixes, 1, "the last fix counts");
         }
     }
 

@@ -293,6 +293,27 @@ fn ground_that_is_rolled_over_again_counts_once_and_another_row_for_itself() {
 }
 
 #[test]
+fn plants_that_a_start_sees_again_count_once_and_another_row_for_itself() {
+    // Half metres. A plant stands after each metre. The machine is drawn back in hold, and starts again.
+    for (back_to, expected) in [(5, 5), (1, 9)] {
+        let entry = |kind, text: &str| Entry { number: 1, time_ms: 0, kind, text: text.to_owned() };
+        let mut log = vec![entry(Kind::Connected, "0.2.0"), entry(Kind::Setting, "ticks_per_m=2000")];
+        let (back, on) = ((back_to..8).rev().map(|at| ("hold", at)), (back_to..=10).map(|at| ("work", at)));
+        for (state, at) in (1..=8).map(|at| ("work", at)).chain(back).chain(on) {
+            let time_ms = 200 * log.len() as u64;
+            let text = format!("state={state} tool=out pos={} speed_mm_s=0 windows=0 unseen_mm=400", 1000 * at);
+            log.push(Entry { time_ms, ..entry(Kind::Status, &text) });
+            if state == "work" && at % 2 == 0 {
+                let text = format!("plant pos={} votes=3 spacing=0 delay=0 hold=0 actuation=0", 1000 * at - 600);
+                log.push(Entry { time_ms, ..entry(Kind::Event, &text) });
+            }
+        }
+        let job = Job::read(&log, &Wanted::default());
+        assert_eq!(job.events().filter(is_detection).count(), expected, "{back_to}");
+    }
+}
+
+#[test]
 fn without_the_lines_of_swings_the_statuses_show_the_weeded_ground() {
     let passes: &[(&str, &str, &[i64])] =
         &[("work", "in", &[0, 500, 1000]), ("work", "out", &[1500, 2000]), ("work", "in", &[2500, 3000, 3500])];

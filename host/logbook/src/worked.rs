@@ -1,8 +1,9 @@
 //! What the machine did while it was at work: each stretch of work in a log, with its time, distance, plants and swings.
 //!
 //! A stretch begins when the state becomes WORK, and ends with it or with the link. Its distance is the net distance by
-//! the wheel. Its plants are those that the tool passed: the beam saw them earlier, by the distance from beam to tool.
-//! Detections that are no weeds count as plants, as for the firmware.
+//! the wheel. A change of state has no position: the speed of the last status leads there. Its plants are those that the
+//! tool passed: the beam saw them earlier, by the distance from beam to tool. After rolling back, `start` sees plants
+//! again, and they count once. Detections that are no weeds count as plants, as for the firmware.
 
 use crate::follower::{Followed, Follower};
 use crate::log::Entry;
@@ -11,11 +12,19 @@ use link::settings::Setting;
 use link::{EventLine, Mode};
 use std::ops::Range;
 
+/// The speed of a status holds for so long at most, in ms. Statuses come ten times a second.
+const NEAR_MS: u64 = 1000;
+
+/// Rolling back farther than this in hold leads to another row, in metres.
+pub const NEXT_ROW_M: f64 = 2.0;
+
 /// A stretch of work.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Worked {
     /// Its lines in the log.
     pub lines: Range<u64>,
+    /// How often the log was opened again before it. The log's clock then begins again.
+    pub session: u32,
     /// Its time by the log's clock, in milliseconds.
     pub time_ms: Range<u64>,
     /// The part of it in which the machine rolled.
@@ -51,7 +60,12 @@ pub fn worked(log: &[Entry]) -> Vec<Worked> {
     let mut open: Option<Open> = None;
     // The leading edges of plants since the distance began.
     let mut plants_mm: Vec<f64> = Vec::new();
+    // The last status: its time, its distance in mm, and its speed in mm/s.
+    let mut last: Option<(u64, f64, f64)> = None;
+    let (mut session, mut before_ms, mut was_work) = (0, 0, false);
     for entry in log {
+        session += u32::from(entry.time_ms < before_ms);
+        before_ms = entry.time_ms;
         let followed = follower.take(entry);
         let mut now_mm = None;
         let mode = match &followed {
@@ -61,13 +75,16 @@ pub fn worked(log: &[Entry]) -> Vec<Worked> {
                     plants_mm.clear();
                 }
                 now_mm = follower.mm(status.position);
-                if let Some(open) = &mut open {
-                    let since_ms = entry.time_ms.saturating_sub(open.worked.time_ms.end);
-                    if status.speed_mm_s != 0 {
-                        open.worked.rolled_ms += since_ms;
-                    }
-                    open.take(now_mm, *goes_on);
+                let is_work = status.mode == Mode::Work;
+                if let Some(mm) = now_mm.filter(|_| is_work && !was_work && status.unseen_mm > 0) {
+                    // `start` has forgotten the ground: the beam sees the plants ahead of it again.
+                    let is_next_row = plants_mm.last().is_some_and(|last_mm| last_mm - mm > 1000.0 * NEXT_ROW_M);
+                    plants_mm.retain(|plant_mm| *plant_mm < mm && !is_next_row);
                 }
+                was_work = is_work;
+                let speed_mm_s = f64::from(status.speed_mm_s);
+                last = now_mm.map(|mm| (entry.time_ms, mm, speed_mm_s));
+                open.iter_mut().for_each(|open| open.take(entry.time_ms, now_mm, speed_mm_s, *goes_on));
                 Some(status.mode)
             }
             Followed::Event(EventLine::State { mode }) => Some(*mode),
@@ -82,13 +99,18 @@ pub fn worked(log: &[Entry]) -> Vec<Worked> {
             }
             _ => continue,
         };
+        let near = last.filter(|(time_ms, ..)| entry.time_ms.saturating_sub(*time_ms) <= NEAR_MS);
+        if let (Followed::Event(_), Some((time_ms, mm, speed_mm_s))) = (&followed, near) {
+            now_mm = Some(mm + speed_mm_s * entry.time_ms.saturating_sub(time_ms) as f64 / 1000.0);
+            open.iter_mut().for_each(|open| open.take(entry.time_ms, now_mm, speed_mm_s, true));
+        }
         if let Some(open) = &mut open
             && mode.is_some()
         {
             (open.worked.time_ms.end, open.worked.lines.end) = (entry.time_ms, entry.number + 1);
         }
         match (mode == Some(Mode::Work), open.is_some()) {
-            (true, false) => open = Some(Open::at(entry, now_mm)),
+            (true, false) => open = Some(Open::at(entry, session, now_mm)),
             (false, true) => {
                 stretches.extend(open.take().map(|open| open.end(&plants_mm, &follower)));
             }
@@ -96,6 +118,7 @@ pub fn worked(log: &[Entry]) -> Vec<Worked> {
         }
         if mode.is_none() {
             plants_mm.clear();
+            last = None;
         }
     }
     stretches.extend(open.map(|open| open.end(&plants_mm, &follower)));
@@ -103,17 +126,21 @@ pub fn worked(log: &[Entry]) -> Vec<Worked> {
 }
 
 impl Open {
-    fn at(entry: &Entry, now_mm: Option<f64>) -> Self {
+    fn at(entry: &Entry, session: u32, now_mm: Option<f64>) -> Self {
         let worked = Worked {
             lines: entry.number..entry.number + 1,
+            session,
             time_ms: entry.time_ms..entry.time_ms,
             ..Worked::default()
         };
         Self { worked, beam_mm: now_mm.map(|mm| mm..mm), goes_on: true }
     }
 
-    /// Takes the beam's place at a status.
-    fn take(&mut self, now_mm: Option<f64>, goes_on: bool) {
+    /// Takes the beam's place at a status or a change of state, and the speed up to there.
+    fn take(&mut self, time_ms: u64, now_mm: Option<f64>, speed_mm_s: f64, goes_on: bool) {
+        if speed_mm_s != 0.0 {
+            self.worked.rolled_ms += time_ms.saturating_sub(self.worked.time_ms.end);
+        }
         match (&mut self.beam_mm, now_mm) {
             (None, Some(mm)) => self.beam_mm = Some(mm..mm),
             (Some(ground_mm), Some(mm)) if goes_on => ground_mm.end = ground_mm.end.max(mm),
@@ -183,10 +210,24 @@ mod tests {
         line(6100, "event", "state is=hold");
         line(7000, "status", &status("hold", 3100, 0));
         let [worked] = &of(&text)[..] else { panic!("{:?}", of(&text)) };
-        assert_eq!((worked.time_ms.clone(), worked.rolled_ms), (1000..6100, 4000));
-        assert_eq!((worked.distance_mm, worked.plants, worked.swings), (Some(2000.0), Some(2), 1));
-        // 2 m in 4 s.
+        // The hold comes 0.1 s after the last status, at 0.5 m/s.
+        assert_eq!((worked.time_ms.clone(), worked.rolled_ms), (1000..6100, 4100));
+        assert_eq!((worked.distance_mm, worked.plants, worked.swings), (Some(2050.0), Some(2), 1));
+        // 2.05 m in 4.1 s.
         assert!((worked.speed_km_h().expect("it is known") - 1.8).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_stretch_between_two_statuses_has_its_distance_by_the_speed_and_a_log_s_next_session_its_number() {
+        let rolling = format!("0,status,{}\n", status("hold", 0, 500))
+            + "40,event,state is=work\n"
+            + &format!("100,status,{}\n", status("work", 50, 500))
+            + &format!("10000,status,{}\n", status("work", 5000, 500))
+            + "10060,event,state is=hold\n";
+        let (_, again) = HEAD.split_once('\n').expect("it has a header");
+        let found = of(&format!("{HEAD}{rolling}{again}{rolling}"));
+        let found: Vec<_> = found.iter().map(|of| (of.session, of.distance_mm, of.rolled_ms)).collect();
+        assert_eq!(found, [(0, Some(5010.0), 10_020), (1, Some(5010.0), 10_020)]);
     }
 
     #[test]
@@ -197,6 +238,30 @@ mod tests {
         let unknown = of(&format!("{HEAD}0,setting,ticks_per_m=0\n0,command,revert\n0,answer,ok\n{at_work}"));
         assert_eq!(unknown.len(), 1);
         assert_eq!((unknown[0].distance_mm, unknown[0].plants, unknown[0].speed_km_h()), (None, None, None));
+    }
+
+    #[test]
+    fn plants_that_a_start_sees_again_count_once_and_those_of_another_row_do_not() {
+        // Half a metre from plant to plant. The machine is drawn back in hold from 3 m, and starts again.
+        for (back_to_mm, expected) in [(1500, 21), (500, 22)] {
+            let (mut text, mut time_ms) = (HEAD.to_owned(), 0);
+            let mut line = |kind: &str, said: &str| {
+                time_ms += 100;
+                writeln!(text, "{time_ms},{kind},{said}").expect("a string takes all");
+            };
+            for (from_mm, until_mm) in [(0, 3000), (back_to_mm, 12_000)] {
+                line("status", &status("hold", from_mm, 0));
+                line("event", "state is=work");
+                line("status", &status("work", from_mm, 0).replace("unseen_mm=0", "unseen_mm=450"));
+                for mm in (from_mm + 250..until_mm).step_by(500) {
+                    line("event", &format!("plant pos={mm} votes=3 spacing=0 delay=0 hold=0 actuation=0"));
+                    line("status", &status("work", mm + 250, 0));
+                }
+                line("event", "state is=hold");
+            }
+            // The tool is 400 mm behind the beam.
+            assert_eq!(of(&text)[1].plants, Some(expected), "{back_to_mm}");
+        }
     }
 
     proptest! {

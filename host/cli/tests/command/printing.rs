@@ -121,6 +121,8 @@ fn dash_is_standard_input_wherever_a_file_is_read() {
         (&["sim", "--row", "-"][..], "the column `position_mm` is missing"),
         (&["train", "-"], "the column `speed_mm_s` is missing"),
         (&["replay", "-"], "the column `time_ms` is missing"),
+        (&["map", "-", "-", "--out", "map.geojson"], "name - once"),
+        (&["evaluate", "-", "--log", "-"], "name - once"),
         (&["trial", "--field", "-"], "line 1"),
         (&["sweep", "--x", "k=1..2:1", "--field", "-"], "line 1"),
         (&["settings", "push", "-"], "line 1"),

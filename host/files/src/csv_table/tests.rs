@@ -62,9 +62,13 @@ fn a_wrong_table_is_refused_with_the_line_and_what_would_be_right() {
         ("place_mm,\"width_mm\n7,1\n", 1, UNCLOSED),
         ("place_mm,pot\n7,\"two\nlines\"\n8,1\n", 2, UNCLOSED),
         ("place_mm,width_mm\n7,1\n#REF!,2\n", 3, "the formula of the first cell failed, `#REF!`: enter its value"),
-        ("place_mm;width_mm\n\"#NV\";2\n7;1\n", 2, "the formula of the first cell failed, `#NV`: enter its value"),
     ] {
         assert_eq!(read(text), Err(format!("table.csv, line {line}: {problem}")), "{text:?}");
+    }
+    let failed = "N/A N/D N/B N/V I/T Н/Д Δ/Υ NV YOK HIÁNYZIK NEDOSTUPNÝ NENÍ_K_DISPOZICI N/D! ¿NOMBRE?";
+    for word in failed.split(' ') {
+        let problem = format!("table.csv, line 2: the formula of the first cell failed, `#{word}`: enter its value");
+        assert_eq!(read(format!("place_mm;width_mm\n\"#{word}\";2\n7;1\n")), Err(problem));
     }
     for text in [
         "place_mm,x\n7,a\n8,Stra\u{df}e\n",
@@ -86,13 +90,30 @@ fn a_wrong_table_is_refused_with_the_line_and_what_would_be_right() {
     }
     assert_eq!(read("place_mm,width_mm,width_mm\n7,1,8\n"), Ok(vec![(2, 7)]), "it is not read");
     assert_eq!(read("place_mm,pot\n7,\"5\"\", clay\"\n8,5\" clay\n"), Ok(vec![(2, 7), (3, 8)]));
-    assert_eq!(read("place_mm,pot\n#7,1\n#Wet!,\n# WET!,\n8,1\n"), Ok(vec![(5, 8)]), "these are notes");
+    let notes = "#7,1\n#Wet!,\n# WET!,\n#P7,1\n#N/a,1\n#1/A,1\n#DRY\n";
+    assert_eq!(read(format!("place_mm,pot\n{notes}8,1\n")), Ok(vec![(9, 8)]), "these are notes");
+}
+
+#[test]
+fn a_heading_that_may_mean_a_column_that_a_table_may_lack_is_asked_about() {
+    let optional = |header: &str| {
+        let table = CsvTable::parse(Path::new("table.csv"), format!("# May\n{header}\n7,1\n").into(), &[]);
+        table.unwrap().with_optional(&["plot"]).map(drop).map_err(|error| error.to_string())
+    };
+    for heading in ["Plot", "PLOT", "plot no", "Plots"] {
+        let question = format!("the column `plot` is missing: did you mean plot by `{heading}`? If not, ");
+        let error = optional(&format!("place_mm,{heading}")).unwrap_err();
+        assert!(error.starts_with(&format!("table.csv, line 2: {question}")), "{error}");
+    }
+    for header in ["plot,place_mm", "place_mm,pilot", "Plot no,plot"] {
+        assert_eq!(optional(header), Ok(()), "{header}");
+    }
 }
 
 #[test]
 fn a_comma_or_point_that_may_be_one_of_thousands_is_refused_unless_another_number_shows_what_it_is() {
     let read = |text: &str| {
-        let table = CsvTable::parse(Path::new("table.csv"), text.into(), &["place_mm"]).unwrap();
+        let table = CsvTable::parse(Path::new("table.csv"), text.into(), &["place_mm", "count"]).unwrap();
         let places = table.lines().map(|line| line.value::<f64>("place_mm", "a number"));
         let counts = table.lines().map(|line| line.value::<u16>("count", "a whole number"));
         let values = places.zip(counts).map(|(place, count)| Ok((place?, count?)));
@@ -104,6 +125,7 @@ fn a_comma_or_point_that_may_be_one_of_thousands_is_refused_unless_another_numbe
         ("place_mm\tcount\n-1200,5\t12,0", vec![(-1200.5, 12)]),
         ("place_mm\tcount\n1.2\t1000", vec![(1.2, 1000)]),
         ("place_mm;count\n1.200;2\n0.5;1.000", vec![(1.2, 2), (0.5, 1)]),
+        ("place_mm;count;read_at\n0,5;1,000;14.30", vec![(0.5, 1)]),
         ("place_mm,count\n1.200,2", vec![(1.2, 2)]),
         ("place_mm,count\n1.200,2.000\n0.5,1", vec![(1.2, 2), (0.5, 1)]),
     ] {
@@ -111,12 +133,13 @@ fn a_comma_or_point_that_may_be_one_of_thousands_is_refused_unless_another_numbe
     }
     for (text, wrong) in [
         ("place_mm\tcount\n750\t1\n1,250\t2", "line 3: place_mm is `1,250`: it has to be a number; its comma"),
-        ("place_mm;count\n0.5;1,000", "line 2: count is `1,000`: it has to be a whole number; its comma may be"),
+        ("place_mm;count;read_at\n1,250;1;0,5", "line 2: place_mm is `1,250`: it has to be a number; its comma"),
+        ("place_mm;count\n0.5;1,000", "count is `1,000`: it has to be a whole number; its comma or point may"),
         ("place_mm,count\n\"-1,250\",1", "; its comma may be one of thousands: leave it out, or write a point"),
-        ("place_mm;count\n0,4;1.000", "line 2: count is `1.000`: it has to be a whole number; its point may be one"),
+        ("place_mm;count\n0,4;1.000", "a whole number; its comma or point may be one of thousands: leave it out"),
         ("place_mm\tcount\n1.200\t1", "line 2: place_mm is `1.200`: it has to be a number; its point may be one"),
         ("place_mm;count\n0,4;1\n0.5;1\n1,250;1", "line 4: place_mm is `1,250`: it has to be a number; its comma"),
-        ("place_mm,count\n1.250,1.000", "line 2: count is `1.000`: it has to be a whole number; its point may be"),
+        ("place_mm,count\n1.250,1.000", "count is `1.000`: it has to be a whole number; its comma or point may"),
     ] {
         let error = read(text).unwrap_err();
         assert!(error.contains(wrong), "{error}");

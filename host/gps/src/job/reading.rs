@@ -8,6 +8,7 @@ use link::settings::Setting;
 use link::{Class, EventLine, Mode, Status};
 use logbook::follower::Follower;
 use logbook::log::{Entry, Kind};
+use logbook::worked::NEXT_ROW_M;
 use std::ops::Range;
 
 /// Time before and after a stretch in which the machine is assumed to have stood, in ms. A fix in this time belongs to
@@ -18,9 +19,6 @@ const STANDING_MS: f64 = 1000.0;
 /// computers stand still during their sleep.
 const AWAKE_M: f64 = 1.0;
 const AWAKE_M_S: f64 = 5.0;
-
-/// Rolling back farther than this in hold leads to another row, in metres.
-const NEXT_ROW_M: f64 = 2.0;
 
 /// A status of the wheel.
 #[derive(Clone, Copy)]
@@ -40,6 +38,8 @@ pub(super) struct Reading {
     pub(super) fixes: Vec<Fix>,
     pub(super) events: Vec<Event>,
     pub(super) ground: Vec<Ground>,
+    /// The first event of the row.
+    row_from: usize,
     pub(super) time_ms: Option<Range<u64>>,
 }
 
@@ -95,6 +95,12 @@ impl Reading {
             None => self.ground.push(Ground::begin(did, at_m, entry.time_ms)),
             Some((passed, _)) if (passed == Did::Rolled) != (did == Did::Rolled) => {
                 self.turn_to(did, at_m, entry.time_ms);
+                // `start` forgets the ground: the beam sees what is ahead of it again.
+                if did != Did::Rolled && status.unseen_mm > 0 {
+                    let row = self.events.split_off(self.row_from);
+                    let is_seen = |kind: EventKind| matches!(kind, EventKind::Detection { .. } | EventKind::Guarded);
+                    self.events.extend(row.into_iter().filter(|it| it.distance_m < at_m || !is_seen(it.kind)));
+                }
             }
             Some((_, start_m)) => {
                 // A swing has its own position. If its line is missing, two statuses show it.
@@ -124,7 +130,9 @@ impl Reading {
             return;
         }
         let is_next_row = passed.did == Did::Rolled && at_m < passed.distance_m.end - NEXT_ROW_M;
-        if !is_next_row {
+        if is_next_row {
+            self.row_from = self.events.len();
+        } else {
             // A swing is reported somewhat later than it is commanded, and perhaps after a status with a farther
             // position.
             at_m = at_m.max(passed.distance_m.start);

@@ -19,7 +19,8 @@ pub struct OfLog {
     pub plot: u32,
     /// The first line of its first stretch, and the last line of its last one.
     pub lines: (u64, u64),
-    /// From start to end of its stretches, in s. A pause counts, if no other stretch lies between.
+    /// From start to end of its stretches, in s. A pause counts, if no stretch of another plot lies between, and the log
+    /// was not opened again.
     pub time_s: f64,
     /// Net distance by the wheel, m. `None` if a part of it is unknown.
     pub distance_m: Option<f64>,
@@ -37,7 +38,7 @@ pub struct OfLog {
 }
 
 impl OfLog {
-    /// `parts` are the plot's stretches, those without another one between together.
+    /// `parts` are the plot's stretches, those without another plot or another session between together.
     fn of(record: &PlotRecord, parts: &[&[(u32, &Worked)]]) -> Self {
         let stretches: Vec<&Worked> = parts.iter().copied().flatten().map(|(_, worked)| *worked).collect();
         let (first, last) = (&stretches[0], &stretches[stretches.len() - 1]);
@@ -104,10 +105,11 @@ pub fn join(records: &mut [PlotRecord], stretches: &[Worked], plots: &[u32]) -> 
     if let Some(unknown) = plots.iter().find(|&&plot| plot > 0 && !numbers.contains(&plot)) {
         return Err(anyhow!("plot {unknown} is not in the table, which has {} plots", records.len()));
     }
-    let stretches: Vec<(u32, &Worked)> = plots.iter().copied().zip(stretches).collect();
+    // A stretch of no plot divides none: between two rows of a plot, the run-up is a part of the turn.
+    let stretches: Vec<(u32, &Worked)> = plots.iter().copied().zip(stretches).filter(|(plot, _)| *plot > 0).collect();
     let mut joined = Vec::new();
     for record in records {
-        let parts = stretches.chunk_by(|(one, _), (next, _)| one == next);
+        let parts = stretches.chunk_by(|(one, a), (next, b)| one == next && a.session == b.session);
         let parts: Vec<_> = parts.filter(|part| part[0].0 == record.plot).collect();
         if parts.is_empty() {
             continue;
@@ -160,6 +162,7 @@ mod tests {
     fn stretch(start_s: u64, seconds: u64, metres: f64) -> Worked {
         Worked {
             lines: start_s..start_s + seconds,
+            session: 0,
             time_ms: 1000 * start_s..1000 * (start_s + seconds),
             rolled_ms: 1000 * seconds,
             distance_mm: Some(1000.0 * metres),
@@ -199,6 +202,12 @@ mod tests {
         assert!((records[0].speed_km_h - 1.8).abs() < 1e-9);
         let joined = join(&mut records, &stretches, &[1, 2, 1, 0]).expect("they match");
         assert_eq!((joined[0].time_s, joined[0].distance_m), (32.0, Some(15.5)), "without the other plot between");
+        let joined = join(&mut records, &stretches, &[1, 0, 1, 2]).expect("they match");
+        assert_eq!((joined[0].time_s, joined[0].distance_m), (80.0, Some(15.5)), "with a run-up between");
+        // The clock began again, so the pause is unknown.
+        let again = [stretch(10, 30, 15.0), Worked { session: 1, ..stretch(60, 40, 20.0) }];
+        let joined = join(&mut records, &again, &[1, 1]).expect("they match");
+        assert_eq!((joined[0].time_s, joined[0].distance_m), (70.0, Some(35.0)));
         let error = join(&mut records, &stretches, &[0, 1, 3, 2]).expect_err("there is no plot 3").to_string();
         assert_eq!(error, "plot 3 is not in the table, which has 2 plots");
         let error = join(&mut [plot(1, 1.8), plot(0, 2.5)], &stretches[..2], &[]).expect_err("one has no number");

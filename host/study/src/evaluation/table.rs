@@ -19,7 +19,7 @@ pub(super) const LEAVE_OUT: &str = "to leave a plot out, put # in front of its l
 /// filled in, text in a number, a value out of range, more damaged plants than plants, and a replication of a speed and
 /// spacing that occurs twice.
 pub fn read_csv(path: &Path) -> Result<Vec<PlotRecord>, FileError> {
-    let table = CsvTable::read_with_gaps(path, &COLUMNS.map(|(name, ..)| name))?;
+    let table = CsvTable::read_with_gaps(path, &COLUMNS.map(|(name, ..)| name))?.with_optional(&["plot"])?;
     let numbers = numbers(&table);
     let mut plots: Vec<(u64, PlotRecord)> = Vec::new();
     for (line, number) in table.lines().zip(numbers) {
@@ -88,6 +88,8 @@ mod tests {
         assert_eq!(numbers(["3", "1", "3", "P7"]), [3, 1, 0, 0]);
         assert_eq!(numbers(["0", "1", "", "2"]), [0, 1, 0, 2]);
         assert_eq!(numbers([""; 4]), [1, 2, 3, 4]);
+        let error = read(&format!("Plot no,{HEADER}3,{LINE}")).unwrap_err();
+        assert!(error.starts_with("trial.csv, line 1: the column `plot` is missing: did you mean plot by"), "{error}");
     }
 
     /// The error for a plot with this text in a column.
