@@ -90,10 +90,16 @@ impl Pass {
         Self { row, machine, motion, timing, start: Start::Command, settings: Vec::new(), examples: Vec::new() }
     }
 
-    /// The firmware's own calculation of how long it sees a plant before the tool is out: the lead, an eighth of it, and
-    /// the sensor's response.
+    /// The value of a further setting, if there is one.
+    fn own(&self, setting: Setting) -> Option<u16> {
+        self.settings.iter().find(|(own, _)| *own == setting).map(|&(_, value)| value)
+    }
+
+    /// The firmware's own calculation of how long it sees a plant before the tool is out: the lead, an eighth of it,
+    /// the sensor's response as it is set, and a millisecond.
     fn notice_s(&self) -> f64 {
-        f64::from(self.timing.lead_out_ms) * 1.125e-3 + 0.002
+        let response_ms = self.own(Setting::BeamResponseMs).unwrap_or(Setting::BeamResponseMs.default());
+        f64::from(self.timing.lead_out_ms) * 1.125e-3 + f64::from(response_ms + 1) / 1000.0
     }
 
     /// The speed from which on the firmware keeps the tool out of the row: a plant just behind the last beam would reach
@@ -103,27 +109,35 @@ impl Pass {
         (beam_to_tool_mm - second_beam_mm.max(self.timing.margin_mm.into())) / self.notice_s()
     }
 
-    /// The firmware's settings, in an order without intermediate contradictions.
+    /// The firmware's settings, in an order without intermediate contradictions. Further settings replace those of the
+    /// machine, and the top speed comes last.
     pub fn firmware_settings(&self) -> Vec<(Setting, u16)> {
         let Machine { wheel_mm, ticks_per_rev, beam_to_tool_mm, second_beam_mm, servo, .. } = self.machine;
         let Timing { margin_mm, lead_out_ms, lead_in_ms, .. } = self.timing;
-        let notice_mm = beam_to_tool_mm - f64::from(margin_mm) - 2.0;
+        let of = |setting: Setting, machine: f64| (setting, self.own(setting).unwrap_or(machine.round() as u16));
+        let beam_to_tool = of(Setting::BeamToToolMm, beam_to_tool_mm);
+        let notice_mm = f64::from(beam_to_tool.1) - f64::from(margin_mm) - 2.0;
         let wanted_mm_s = (1.25 * self.motion.top_speed_mm_s()).max(SLOWEST_TOP_SPEED_MM_S);
         let top_speed_mm_s = wanted_mm_s.min(notice_mm / self.notice_s()).min(TOP_SPEED_MM_S);
         let mut settings = vec![
             (Setting::TopSpeedMmS, SLOWEST_TOP_SPEED_MM_S as u16),
-            (Setting::TicksPerRev, ticks_per_rev as u16),
-            (Setting::WheelMm, wheel_mm.round() as u16),
-            (Setting::BeamToToolMm, beam_to_tool_mm.round() as u16),
-            (Setting::SecondBeamMm, second_beam_mm.round() as u16),
-            (Setting::MarginMm, margin_mm as u16),
+            // The default encoder is fine enough for each wheel.
+            of(Setting::WheelMm, wheel_mm),
+            of(Setting::TicksPerRev, ticks_per_rev.into()),
+            beam_to_tool,
+            of(Setting::SecondBeamMm, second_beam_mm),
             (Setting::LeadOutMs, lead_out_ms as u16),
+            (Setting::MarginMm, margin_mm as u16),
             (Setting::LeadInMs, lead_in_ms as u16),
             (Setting::ServoInUs, servo.in_us.round() as u16),
             (Setting::ServoOutUs, servo.out_us.round() as u16),
-            (Setting::TopSpeedMmS, top_speed_mm_s as u16),
         ];
-        settings.extend(&self.settings);
+        if servo.in_us.round() == f64::from(Setting::ServoOutUs.default()) {
+            // In between, both pulses would be equal.
+            settings.insert(0, (Setting::ServoOutUs, 1750));
+        }
+        settings.extend(self.settings.iter().filter(|(setting, _)| *setting != Setting::TopSpeedMmS));
+        settings.push(of(Setting::TopSpeedMmS, top_speed_mm_s.floor()));
         settings
     }
 }
@@ -185,6 +199,40 @@ impl Conditions {
         Pass { settings: self.firmware_settings(), ..pass }
     }
 
+    /// Which settings describe another machine than the simulated one, and what to set instead. A field file may hold
+    /// the settings of a real machine.
+    pub(crate) fn other_machine(&self) -> Vec<String> {
+        let of = |setting: Setting| self.setting_or(setting, setting.default().into());
+        let (wheel_mm, ticks_per_rev) = (of(Setting::WheelMm), of(Setting::TicksPerRev) as u32);
+        let set_mm = match of(Setting::TicksPerM) {
+            0.0 => Machine { wheel_mm, ticks_per_rev, ..Machine::default() }.tick_mm(),
+            ticks_per_m => 1000.0 / ticks_per_m,
+        };
+        let clean_mm = Machine::default().tick_mm();
+        let slipping_mm = clean_mm * (1.0 - self.ground.slip_percent / 100.0);
+        // Settings before and after a calibration are within a tenth of one of these.
+        let is_other = [clean_mm, slipping_mm].iter().all(|tick_mm| (set_mm / tick_mm - 1.0).abs() > 0.1);
+        let wheel = is_other.then(|| {
+            let (set_per_m, right_per_m) = (1000.0 / set_mm, 1000.0 / slipping_mm);
+            format!(
+                "The settings expect {set_per_m:.0} encoder counts a metre, but the simulated wheel makes \
+                 {right_per_m:.0} with its slip. \
+                 Set ticks_per_m to {right_per_m:.0}, and leave out ticks_per_rev and wheel_mm."
+            )
+        });
+        let Mechanism { beam_to_tool_mm, second_beam_mm, .. } = self.machine;
+        let beams = [(Setting::BeamToToolMm, beam_to_tool_mm), (Setting::SecondBeamMm, second_beam_mm)];
+        let beams = beams.into_iter().filter_map(|(setting, has_mm)| {
+            let (name, set_mm) = (setting.text().to_string(), self.setting_or(setting, has_mm));
+            (set_mm.round() != has_mm.round()).then(|| {
+                format!(
+                    "settings.{name} is {set_mm}, but the simulated machine has {has_mm}. Set machine.{name} instead."
+                )
+            })
+        });
+        wheel.into_iter().chain(beams).collect()
+    }
+
     /// A setting of the firmware, or what it is otherwise.
     fn setting_or(&self, setting: Setting, otherwise: f64) -> f64 {
         self.settings.get(&setting.text().to_string()).map_or(otherwise, |&value| value.into())
@@ -202,7 +250,54 @@ impl Conditions {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::motion::mm_s;
     use crate::row::Canopy;
+    use control::settings::Settings;
+
+    #[test]
+    fn no_setting_contradicts_those_before_it() {
+        let changes: [&[(&str, f64)]; 5] = [
+            // The automatic top speed follows the response.
+            &[("beam_response_ms", 5.0)],
+            // The field's top speed fits its response, but the automatic one would not.
+            &[
+                ("machine.beam_to_tool_mm", 500.0),
+                ("margin_mm", 30.0),
+                ("lead_out_ms", 212.0),
+                ("top_speed_mm_s", 1805.0),
+                ("beam_response_ms", 20.0),
+            ],
+            &[("machine.second_beam_mm", 200.0), ("beam_to_tool_mm", 1500.0), ("second_beam_mm", 0.0)],
+            &[("ticks_per_rev", 1000.0), ("wheel_mm", 300.0)],
+            &[("servo_in_us", 2000.0), ("servo_out_us", 1500.0)],
+        ];
+        for changes in changes {
+            let row = Row::new(vec![Canopy::plant(500.0, 150.0)]).unwrap();
+            let conditions = Conditions::with("transplanted", changes);
+            let mut settings = Settings::new();
+            for (setting, value) in conditions.pass_at_speed(row, mm_s(5.0), 1).firmware_settings() {
+                settings.change(setting, value).unwrap();
+                assert_eq!(settings.contradiction(), None, "{changes:?}: {} {value}", setting.text());
+            }
+            for (setting, value) in conditions.firmware_settings() {
+                assert_eq!(settings.get(setting), value, "{changes:?}: {}", setting.text());
+            }
+        }
+    }
+
+    #[test]
+    fn settings_of_another_machine_get_a_warning() {
+        let warning = |change: (&str, f64)| Conditions::with("transplanted", &[change]).warning().unwrap_or_default();
+        // Not calibrated, calibrated by the diameter, and measured.
+        for same in [("wheel_mm", 400.0), ("wheel_mm", 380.0), ("ticks_per_m", 2010.0), ("beam_to_tool_mm", 400.0)] {
+            assert_eq!(warning(same), "");
+        }
+        for other in [("ticks_per_rev", 6000.0), ("wheel_mm", 500.0), ("ticks_per_m", 3820.0)] {
+            assert!(warning(other).contains("Set ticks_per_m to 2010, and leave out"), "{other:?}: {}", warning(other));
+        }
+        let said = warning(("beam_to_tool_mm", 600.0));
+        assert!(said.starts_with("settings.beam_to_tool_mm is 600, but the simulated machine has 400. Set"), "{said}");
+    }
 
     #[test]
     fn a_calibrated_wheel_is_set_after_its_diameter_which_would_reset_it() {
@@ -227,6 +322,8 @@ mod tests {
             Conditions::with("walked", changes).pass_at_speed(row, 500.0, 1).too_fast_mm_s().round()
         };
         assert_eq!(too_fast_mm_s(&[]), 1509.0);
+        // A slower sensor takes 10 ms of it.
+        assert_eq!(too_fast_mm_s(&[("beam_response_ms", 11.0)]), 1404.0);
         // Without it, the margin is kept too.
         assert_eq!(too_fast_mm_s(&[("machine.second_beam_mm", 0.0)]), 2853.0);
     }

@@ -1,6 +1,6 @@
 //! Arguments that several commands share: the row, and the machine that rolls along it.
 
-use crate::{number_within, source, whole_within};
+use crate::{number_within, source, tell, whole_within};
 use anyhow::{Result, ensure};
 use clap::Args;
 use field::conditions::{self, Conditions};
@@ -96,13 +96,40 @@ impl CourseArguments {
     /// distance from beam to tool.
     pub fn conditions_of(&self, field: &str) -> Result<Conditions> {
         let mut conditions = source::field(field)?;
-        if let Some(beam_to_tool_mm) = self.beam_to_tool {
-            // A second beam cannot be farther back, and a beam cannot be that far ahead on a machine with two.
-            if conditions.machine.second_beam_mm > 0.0 && !(300..=1000).contains(&beam_to_tool_mm) {
-                conditions.set("machine.second_beam_mm", 0.0)?;
-            }
-            conditions.set("machine.beam_to_tool_mm", beam_to_tool_mm.into())?;
+        let Some(beam_to_tool_mm) = self.beam_to_tool else { return Ok(conditions) };
+        let set = |conditions: &mut Conditions| conditions.set("machine.beam_to_tool_mm", beam_to_tool_mm.into());
+        // Only the second beam can contradict the distance.
+        if set(&mut conditions).is_err() {
+            conditions.set("machine.second_beam_mm", 0.0)?;
+            set(&mut conditions)?;
+            tell!(
+                "Warning: with --beam-to-tool {beam_to_tool_mm}, the firmware cannot use this field's second beam. \
+                 The simulated machine has one beam."
+            );
         }
         Ok(conditions)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Program {
+        #[command(flatten)]
+        course: CourseArguments,
+    }
+
+    #[test]
+    fn the_second_beam_stays_where_the_firmware_can_use_it() {
+        // It stands 200 mm behind the first.
+        for (beam_to_tool, second_beam_mm) in [("271", 0.0), ("272", 200.0), ("1000", 200.0), ("1001", 0.0)] {
+            let course = Program::parse_from(["sim", "--beam-to-tool", beam_to_tool]).course;
+            let conditions = course.conditions_of("walked").unwrap();
+            assert_eq!(conditions.machine.second_beam_mm, second_beam_mm, "{beam_to_tool}");
+            assert_eq!(conditions.machine.beam_to_tool_mm.to_string(), beam_to_tool);
+        }
     }
 }

@@ -44,6 +44,11 @@ fn a_machine_that_strays_into_its_sweeps_gets_a_warning_from_each_command_that_w
 }
 
 #[test]
+fn a_field_s_second_beam_that_the_distance_removes_is_named() {
+    assert_refused(&["sim", "--elf", "no.elf", "--beam-to-tool", "1500"], "The simulated machine has one beam.");
+}
+
+#[test]
 fn canopies_wider_than_their_spacing_are_refused() {
     assert_refused(&["sim", "--spacing", "100", "--canopy", "150"], "--spacing has to exceed --canopy");
 }
