@@ -1,6 +1,6 @@
 //! The full-screen monitor on a terminal of 24 lines, with a virtual Uno at its port.
 
-use std::fs::File;
+use std::fs::{self, File};
 use std::process::{Child, Command};
 use std::thread::sleep;
 use std::time::Duration;
@@ -8,7 +8,7 @@ use tempfile::TempDir;
 use uno::pty::Pty;
 use uno_run::firmware;
 use uno_run::live::Setup;
-use uno_run::live::rows::LiveRows;
+use uno_run::live::rows::{Background, LiveRows};
 
 const LINES: u16 = 24;
 const COLUMNS: u16 = 100;
@@ -19,24 +19,35 @@ const LOOKS: usize = 60_000;
 /// What a terminal sends for this key.
 const PAGE_UP: &str = "\x1b[5~";
 
-/// A terminal, and the monitor that runs on it.
+/// A terminal, the monitor that runs on it and writes log.csv, and its row.
 struct Terminal {
     pty: Pty,
     screen: vt100::Parser,
     monitor: Child,
+    _row: Background,
+    folder: TempDir,
 }
 
 impl Terminal {
-    fn with_monitor(port: &str) -> Self {
+    /// Returns when the monitor shows the row.
+    fn with_monitor() -> Self {
+        let folder = TempDir::new().expect("there is room for a folder");
+        let [port, log] = ["row", "log.csv"].map(|name| folder.path().join(name));
+        let elf = Some(firmware::build().expect("the firmware builds"));
+        let setup = Setup { elf, link: Some(port.clone()), fast: true, ..Setup::default() };
+        let row = LiveRows::start(vec![setup]).expect("it starts").run_in_background();
         let pty = Pty::open().expect("there is a pseudo terminal");
         let path = pty.path().to_owned();
         let size = ["rows".to_owned(), LINES.to_string(), "cols".to_owned(), COLUMNS.to_string()];
         assert!(Command::new("stty").arg("-F").arg(&path).args(size).status().expect("there is stty").success());
         let side = || File::options().read(true).write(true).open(&path).expect("it is there");
         let mut monitor = Command::new(env!("CARGO_BIN_EXE_weeder"));
-        monitor.args(["monitor", "--port", port]).env("TERM", "xterm").stdin(side()).stdout(side()).stderr(side());
+        monitor.arg("monitor").arg("--port").arg(port).arg("--log").arg(log);
+        monitor.env("TERM", "xterm").stdin(side()).stdout(side()).stderr(side());
         let monitor = monitor.spawn().expect("cargo has built the command");
-        Self { pty, screen: vt100::Parser::new(LINES, COLUMNS, 0), monitor }
+        let mut terminal = Self { pty, screen: vt100::Parser::new(LINES, COLUMNS, 0), monitor, _row: row, folder };
+        terminal.until(|text| text.contains("tool out"));
+        terminal
     }
 
     fn press(&mut self, keys: &str) {
@@ -44,6 +55,23 @@ impl Terminal {
         while !bytes.is_empty() {
             bytes = &bytes[self.pty.write(bytes).expect("the terminal works")..];
         }
+    }
+
+    /// Waits until the monitor has ended with success, and the terminal is as before.
+    fn until_restored(&mut self) {
+        let mut status = None;
+        let mut bytes = [0; 4096];
+        for _ in 0..LOOKS {
+            let count = self.pty.read(&mut bytes).expect("the terminal works");
+            self.screen.process(&bytes[..count]);
+            if count == 0 && status.is_some() {
+                break;
+            }
+            status = self.monitor.try_wait().expect("it is a child");
+            sleep(Duration::from_millis(5));
+        }
+        assert!(status.is_some_and(|status| status.success()), "{status:?}");
+        assert!(!self.screen.screen().alternate_screen());
     }
 
     /// Waits until the screen shows something, and returns the screen.
@@ -76,13 +104,7 @@ impl Drop for Terminal {
 
 #[test]
 fn all_of_help_can_be_read_and_the_newest_line_is_shown_again() {
-    let folder = TempDir::new().expect("there is room for a folder");
-    let port = folder.path().join("row");
-    let elf = Some(firmware::build().expect("the firmware builds"));
-    let setup = Setup { elf, link: Some(port.clone()), fast: true, ..Setup::default() };
-    let _row = LiveRows::start(vec![setup]).expect("it starts").run_in_background();
-    let mut terminal = Terminal::with_monitor(port.to_str().expect("it is text"));
-    terminal.until(|text| text.contains("tool out"));
+    let mut terminal = Terminal::with_monitor();
     let [first, last] = ["this list", "the firmware"];
     terminal.press("help\r");
     let end = terminal.until(|text| text.contains(last));
@@ -95,4 +117,29 @@ fn all_of_help_can_be_read_and_the_newest_line_is_shown_again() {
     assert!(!page.contains(last), "{page}");
     terminal.press("hold\r");
     terminal.until(|text| !text.contains("more below"));
+}
+
+#[test]
+fn esc_is_hold_with_any_key_behind_it_and_after_a_long_paste() {
+    let mut terminal = Terminal::with_monitor();
+    // A HOLD that comes before the last one's answer is the same line.
+    let holds = |count| move |text: &str| text.matches("> hold").count() == count && text.contains("HOLD 1 of 1");
+    terminal.press("\x1b\r");
+    terminal.until(holds(1));
+    terminal.press(&"x".repeat(3000));
+    terminal.until(|text| text.contains("> xxx"));
+    terminal.press("\x1b");
+    terminal.until(holds(2));
+    // Esc and Ctrl-C.
+    terminal.press("\x1b\x03");
+    terminal.until_restored();
+    let log = fs::read_to_string(terminal.folder.path().join("log.csv")).expect("it was written");
+    assert_eq!(log.matches(",command,hold\n").count(), 3, "{log}");
+}
+
+#[test]
+fn a_terminated_monitor_restores_the_terminal() {
+    let mut terminal = Terminal::with_monitor();
+    Command::new("kill").args(["-TERM", &terminal.monitor.id().to_string()]).status().expect("there is a kill");
+    terminal.until_restored();
 }
