@@ -78,6 +78,7 @@ impl Conditions {
     }
 
     fn parse(path: &Path, text: &str) -> Result<Self, FileError> {
+        bounded_file::check_nesting(path, text)?;
         let conditions: Self = toml::from_str(text).map_err(|error| {
             let byte = error.span().map_or(0, |span| span.start);
             FileError::at_byte(path, text, byte, explain(text, byte, &error))

@@ -1,15 +1,21 @@
-//! Reads a file up to a limit: a device or a recording without end is refused.
+//! Reads a file up to a limit: a device or a recording without end is refused. [`check_nesting`] refuses TOML that would
+//! exhaust the parser's stack.
 
 use crate::FileError;
 use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::Path;
+use toml_parser::Source;
+use toml_parser::lexer::TokenKind;
 
 /// The longest file that people write, in MiB. Most have some KiB.
 const WRITTEN_MIB: u64 = 16;
 
 /// The longest record, in MiB. A machine and its receiver send some 60 in a day.
 const RECORDED_MIB: u64 = 256;
+
+/// The deepest nesting of tables, lists and dotted keys in TOML. No file of the tools nests more than three.
+const MOST_NESTED: usize = 40;
 
 /// Reads a file of UTF-8, without its byte order mark.
 ///
@@ -59,9 +65,53 @@ fn up_to(path: &Path, most_mib: u64) -> Result<Vec<u8>, FileError> {
     Ok(bytes)
 }
 
+/// Checks the nesting of TOML before it is parsed.
+///
+/// # Errors
+/// Names the line in which it is too deep.
+pub fn check_nesting(path: &Path, text: &str) -> Result<(), FileError> {
+    let (mut depth, mut dots) = (0_usize, 0_usize);
+    for token in Source::new(text).lex() {
+        match token.kind() {
+            TokenKind::LeftSquareBracket | TokenKind::LeftCurlyBracket => (depth, dots) = (depth + 1, 0),
+            TokenKind::RightSquareBracket | TokenKind::RightCurlyBracket => {
+                (depth, dots) = (depth.saturating_sub(1), 0)
+            }
+            TokenKind::Equals | TokenKind::Comma | TokenKind::Newline => dots = 0,
+            TokenKind::Dot => dots += 1,
+            _ => {}
+        }
+        if depth + dots > MOST_NESTED {
+            let problem = format!("more than {MOST_NESTED} tables or lists lie within each other");
+            return Err(FileError::at_byte(path, text, token.span().start(), problem));
+        }
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn deep_nesting_is_refused_with_its_line_and_brackets_in_texts_do_not_count() {
+        let check = |text: &str| check_nesting(Path::new("my.toml"), text).map_err(|error| error.to_string());
+        let deep = [
+            "a = ".to_owned() + &"{ a = ".repeat(400),
+            "a = ".to_owned() + &"[".repeat(100_000),
+            "a".to_owned() + &".a".repeat(400) + " = 1",
+            "[".to_owned() + &"a.".repeat(400) + "a]",
+            "\"\\\"\" = \"\"\nb = ".to_owned() + &"[".repeat(41),
+        ];
+        for text in deep {
+            assert!(check(&text).unwrap_err().contains("more than 40 tables or lists"), "{text:.40}");
+        }
+        assert!(
+            check(&format!("k = 1\n# {0}\na = \"{0}\"\nb = '{0}'\nc = \"\"\"{0}\n\"{0}\"\"\"\n", "[".repeat(99)))
+                .is_ok()
+        );
+        assert!(check("a = 1.5\n".repeat(99).as_str()).is_ok());
+    }
 
     #[test]
     fn a_file_that_is_no_text_is_refused_by_what_it_is() {

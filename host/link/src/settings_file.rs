@@ -54,6 +54,7 @@ pub(super) fn no_toml(path: &Path, text: &str, error: &TomlError) -> FileError {
 }
 
 fn parse(path: &Path, text: &str) -> Result<(DocumentMut, Named), FileError> {
+    bounded_file::check_nesting(path, text)?;
     let document: DocumentMut = text.parse().map_err(|error| no_toml(path, text, &error))?;
     let (mut settings, mut foreign) = (Vec::new(), Vec::new());
     let mut old_merge_gap = None;

@@ -83,7 +83,7 @@ impl Budgets {
     /// # Errors
     /// If it cannot be read, or says what is not known.
     pub fn read(path: &Path) -> Result<Budgets, BoundsError> {
-        let text = file::text(path)?;
+        let text = file::toml(path)?;
         toml::from_str(&text).map_err(|error| {
             let line = error.span().map_or(1, |span| 1 + text[..span.start].matches('\n').count());
             let problem = error.message().trim().replace('\n', ", ");
