@@ -143,6 +143,7 @@ impl Ground {
         let is_beyond_memory = self.detector.frontier() - self.beam > memory;
         if is_beyond_memory {
             self.begin_here(self.detector.is_broken());
+            self.keep_out.mark_dropped();
         }
         let complete = self.detector.roll_to(self.beam - self.leads.response, self.geometry.merge_gap());
         // Counted from the frontier: the beam is at most the memory behind it. From the tool, the distance could exceed the range

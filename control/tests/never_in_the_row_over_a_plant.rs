@@ -254,14 +254,14 @@ fn work_begins_on_ground_that_the_beam_has_yet_to_see() {
 
 #[test]
 fn start_now_keeps_the_known_ground_after_a_jolt_back_but_not_after_rolling_back() {
-    // Up to the margin, and beyond.
-    for (back_mm, keeps) in [(0.0, true), (40.0, true), (70.0, false), (3000.0, false)] {
+    // Up to the margin, and beyond; also where the memory ends, and the beam sees the ground again.
+    for (back_mm, keeps) in [(0.0, true), (40.0, true), (70.0, false), (3000.0, false), (8010.0, false)] {
         let mut rolling = Rolling::along(Vec::new(), Vec::new(), &[]);
-        rolling.roll_to(6000.0, 500.0);
+        rolling.roll_to(9000.0, 500.0);
         rolling.machine.hold();
-        rolling.roll_to(6000.0 - back_mm, 500.0);
+        rolling.roll_to(9000.0 - back_mm, 500.0);
         rolling.machine.start(true).unwrap();
-        rolling.roll_to(6010.0 - back_mm, 500.0);
+        rolling.roll_to(9010.0 - back_mm, 500.0);
         assert_eq!(rolling.machine.tool_out(), !keeps, "{back_mm} mm");
     }
 }

@@ -88,9 +88,10 @@ impl Ground {
         self.keep_out.open_from(self.geometry.margin()) - (self.tool() + distance)
     }
 
-    /// Whether the beam has rolled back by more than the margin. Up to the frontier it sees no edge.
+    /// Whether the beam has rolled back by more than the margin, so that it sees no edge up to the frontier; or the tool to dropped
+    /// ground.
     pub fn has_rolled_back(&self) -> bool {
-        self.detector.frontier() - self.beam > self.geometry.margin()
+        self.detector.frontier() - self.beam > self.geometry.margin() || self.has_left()
     }
 
     /// The operator confirms that no plant stands on the unknown ground at the tool and ahead of it. Does nothing on known ground,

@@ -122,6 +122,11 @@ impl KeepOut {
         self.has_dropped && self.known_from.is_ahead_of(position)
     }
 
+    /// The unknown ground was seen, and dropped.
+    pub fn mark_dropped(&mut self) {
+        self.has_dropped = true;
+    }
+
     /// Declares the ground known from `position` on. `position` lies behind the frontier.
     pub fn set_known_from(&mut self, position: WrappedPosition) {
         (self.known_from, self.has_dropped) = (position, false);

@@ -177,7 +177,8 @@ fn ctrl_c() -> Result<Arc<AtomicBool>> {
     let stop = Arc::new(AtomicBool::new(false));
     let asked_to_stop = Arc::clone(&stop);
     if ctrlc::try_set_handler(move || asked_to_stop.store(true, Ordering::Relaxed)).is_err() {
-        // One of the signals is ignored already. `nohup` ignores SIGHUP, which then ends nothing.
+        // One of the signals is ignored already: `nohup` ignores SIGHUP, and a script SIGINT for what it starts in the background.
+        // SIGHUP stays as it was, because nothing tells which one it is.
         for signal in [SIGINT, SIGTERM] {
             signal_hook::flag::register(signal, Arc::clone(&stop)).context("Ctrl-C cannot be caught")?;
         }

@@ -129,11 +129,14 @@ impl Model {
         self.slack += ticks;
     }
 
-    /// Whether the beam, at a position, has rolled back by more than `distance`. Within `tolerance`, the machine may say otherwise.
-    pub fn has_rolled_back(&mut self, place: i64, distance: i64, tolerance: i64) -> bool {
-        let beyond = self.frontier - place - distance;
-        self.may_have_forgotten |= beyond.abs() <= self.slack + tolerance;
-        beyond > 0
+    /// How far the beam, at a position, has rolled back.
+    pub fn rolled_back(&self, place: i64) -> i64 {
+        self.frontier - place
+    }
+
+    /// Doubts the machine's memory, if a distance that decides about it is within a tolerance.
+    pub fn doubt(&mut self, distance: i64, tolerance: i64) {
+        self.may_have_forgotten |= distance.abs() <= self.slack + tolerance;
     }
 
     /// The ground ahead of a position is seen again as new.

@@ -138,10 +138,13 @@ impl<M: Machine> Drive<M> {
         let margin = machine.ticks(Setting::MarginMm);
         // The distance rolled since the line was executed.
         let late = if M::IS_OPEN { 0 } else { (self.physics.speed.abs() * ANSWERED_S) as i64 };
-        let expectations = &mut self.expectations;
-        let blur = expectations.blur();
-        let keeps = words(line) == ["start", "now"] && !expectations.model.has_rolled_back(here, margin, late + blur);
+        let (expectations, is_now) = (&mut self.expectations, words(line) == ["start", "now"]);
+        let beyond = expectations.model.rolled_back(here) - margin;
+        let keeps = is_now && beyond <= 0;
         expectations.follow_work(works, keeps, here);
+        if is_now {
+            expectations.model.doubt(beyond, late + expectations.blur());
+        }
         if works && keeps && unseen_mm > 0 {
             let tool = here - machine.ticks(Setting::BeamToToolMm);
             let unseen = f64::from(unseen_mm + 1) * f64::from(machine.settings().wheel().ticks(1000).0) / 1000.0;
