@@ -71,11 +71,12 @@ function faults() {
     return resolve("build/faults.json");
 }
 
-/** The page's HTML, with the English texts instead of their names behind `$`. */
+/** The page's HTML without its indentation, with the English texts instead of their names behind `$`. */
 async function html() {
     const { code } = await transform(readFileSync("src/words/en.ts"), { loader: "ts" });
     const { words } = await import(`data:text/javascript,${encodeURIComponent(code)}`);
-    return readFileSync("src/index.html", "utf8").replaceAll(/\$(\w+)/g, (_, name) => {
+    const source = readFileSync("src/index.html", "utf8").replaceAll(/\n +/g, "\n");
+    return source.replaceAll(/\$(\w+)/g, (_, name) => {
         if (words[name] === undefined) throw new Error(`src/words/en.ts lacks the text ${name} of src/index.html`);
         return words[name];
     });

@@ -146,6 +146,11 @@ test("the address with the code pairs by itself, and machines side by side are s
     await front.goto(served.here);
     await part(here.page, "left", "why").filter({ hasText: "No machine is connected." }).waitFor();
     await part(front, "left", "state").filter({ hasText: "hold" }).waitFor();
+    // Nor does a tab that is loaded behind: it asks again instead.
+    await front.addInitScript(() => Object.defineProperty(document, "hidden", { value: true }));
+    await front.reload();
+    await part(front, "left", "why").filter({ hasText: "No machine is connected." }).waitFor();
+    await front.waitForRequest("**/machines");
     await front.close();
     await hide(false);
     await part(here.page, "left", "state").filter({ hasText: "hold" }).waitFor();

@@ -40,7 +40,7 @@ pub struct Pass {
     pub timing: Timing,
     /// How the firmware is put to work.
     pub start: Start,
-    /// Further settings, applied after the settings of machine and timing.
+    /// Further settings. Those of the machine replace its own, and the others follow machine and timing.
     pub settings: Vec<(Setting, u16)>,
     /// Examples that are taught in addition to the built-in ones.
     pub examples: Vec<Example<{ features::COUNT }>>,
@@ -121,6 +121,8 @@ impl Pass {
         let top_speed_mm_s = wanted_mm_s.min(notice_mm / self.notice_s()).min(TOP_SPEED_MM_S);
         let mut settings = vec![
             (Setting::TopSpeedMmS, SLOWEST_TOP_SPEED_MM_S as u16),
+            // Without a margin there is room for each lead.
+            (Setting::MarginMm, 0),
             // The default encoder is fine enough for each wheel.
             of(Setting::WheelMm, wheel_mm),
             of(Setting::TicksPerRev, ticks_per_rev.into()),
@@ -129,14 +131,16 @@ impl Pass {
             (Setting::LeadOutMs, lead_out_ms as u16),
             (Setting::MarginMm, margin_mm as u16),
             (Setting::LeadInMs, lead_in_ms as u16),
-            (Setting::ServoInUs, servo.in_us.round() as u16),
-            (Setting::ServoOutUs, servo.out_us.round() as u16),
+            of(Setting::ServoInUs, servo.in_us),
+            of(Setting::ServoOutUs, servo.out_us),
         ];
         if servo.in_us.round() == f64::from(Setting::ServoOutUs.default()) {
             // In between, both pulses would be equal.
             settings.insert(0, (Setting::ServoOutUs, 1750));
         }
-        settings.extend(self.settings.iter().filter(|(setting, _)| *setting != Setting::TopSpeedMmS));
+        let is_sent = |wanted: &Setting| settings.iter().any(|(sent, _)| sent == wanted);
+        let others: Vec<_> = self.settings.iter().filter(|(setting, _)| !is_sent(setting)).collect();
+        settings.extend(others);
         settings.push(of(Setting::TopSpeedMmS, top_speed_mm_s.floor()));
         settings
     }
@@ -256,7 +260,7 @@ mod tests {
 
     #[test]
     fn no_setting_contradicts_those_before_it() {
-        let changes: [&[(&str, f64)]; 5] = [
+        let changes: [&[(&str, f64)]; 7] = [
             // The automatic top speed follows the response.
             &[("beam_response_ms", 5.0)],
             // The field's top speed fits its response, but the automatic one would not.
@@ -270,17 +274,24 @@ mod tests {
             &[("machine.second_beam_mm", 200.0), ("beam_to_tool_mm", 1500.0), ("second_beam_mm", 0.0)],
             &[("ticks_per_rev", 1000.0), ("wheel_mm", 300.0)],
             &[("servo_in_us", 2000.0), ("servo_out_us", 1500.0)],
+            // So near a beam leaves room for a long lead or a wide margin.
+            &[("machine.beam_to_tool_mm", 100.0), ("margin_mm", 10.0), ("lead_out_ms", 500.0)],
+            &[("machine.beam_to_tool_mm", 100.0), ("margin_mm", 90.0), ("lead_out_ms", 50.0)],
         ];
         for changes in changes {
             let row = Row::new(vec![Canopy::plant(500.0, 150.0)]).unwrap();
             let conditions = Conditions::with("transplanted", changes);
             let mut settings = Settings::new();
-            for (setting, value) in conditions.pass_at_speed(row, mm_s(5.0), 1).firmware_settings() {
+            let sent = conditions.pass_at_speed(row, mm_s(5.0), 1).firmware_settings();
+            for &(setting, value) in &sent {
                 settings.change(setting, value).unwrap();
                 assert_eq!(settings.contradiction(), None, "{changes:?}: {} {value}", setting.text());
             }
             for (setting, value) in conditions.firmware_settings() {
                 assert_eq!(settings.get(setting), value, "{changes:?}: {}", setting.text());
+                let is_in_steps = [Setting::TopSpeedMmS, Setting::ServoOutUs].contains(&setting);
+                let times = sent.iter().filter(|(sent, _)| *sent == setting).count();
+                assert!(times == 1 || is_in_steps, "{changes:?}: {} {times} times", setting.text());
             }
         }
     }

@@ -139,10 +139,14 @@ impl CsvTable {
     /// Checks the columns that a table may lack. A heading such as `Plot no` may mean `plot`.
     ///
     /// # Errors
-    /// Names a heading that begins with the name of a missing column.
+    /// Names a heading that may mean a missing column.
     pub fn with_optional(self, columns: &[&str]) -> Result<Self, FileError> {
+        /// Endings of a column's name that leave its meaning. `plot_area` is another column.
+        const ENDINGS: [&str; 7] = ["", "s", "no", "nr", "num", "number", "id"];
+        let is_ending = |rest: &str| ENDINGS.contains(&rest.trim_matches(|letter: char| !letter.is_alphanumeric()));
         for column in columns.iter().filter(|column| !self.header.iter().any(|name| name == **column)) {
-            if let Some(near) = self.header.iter().find(|name| name.to_lowercase().starts_with(*column)) {
+            let may_mean = |name: &&str| name.to_lowercase().strip_prefix(*column).is_some_and(is_ending);
+            if let Some(near) = self.header.iter().find(may_mean) {
                 let problem = format!(
                     "the column `{column}` is missing: did you mean {column} by `{near}`? If not, name it otherwise"
                 );

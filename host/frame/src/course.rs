@@ -95,8 +95,8 @@ impl CourseArguments {
     /// The machine and what is around it, in this field. Fails if it is no field, or its machine has no room for the
     /// distance from beam to tool.
     pub fn conditions_of(&self, field: &str) -> Result<Conditions> {
-        let mut conditions = source::field(field)?;
-        let Some(beam_to_tool_mm) = self.beam_to_tool else { return Ok(conditions) };
+        let Some(beam_to_tool_mm) = self.beam_to_tool else { return Ok(source::field(field)?) };
+        let mut conditions = Conditions::load(field)?;
         let set = |conditions: &mut Conditions| conditions.set("machine.beam_to_tool_mm", beam_to_tool_mm.into());
         // Only the second beam can contradict the distance.
         if set(&mut conditions).is_err() {
@@ -107,6 +107,7 @@ impl CourseArguments {
                  The simulated machine has one beam."
             );
         }
+        source::warn(&conditions);
         Ok(conditions)
     }
 }

@@ -31,9 +31,12 @@ fn named(name: OsString) -> Result<OsString, String> {
 
 /// The conditions of a field. Prints what is likely wrong with them. Fails if it is neither a preset nor a valid file.
 pub fn field(preset_or_file: &str) -> Result<Conditions, FileError> {
-    let conditions = Conditions::load(preset_or_file)?;
+    Conditions::load(preset_or_file).inspect(warn)
+}
+
+/// Prints what is likely wrong with these conditions.
+pub fn warn(conditions: &Conditions) {
     conditions.warning().iter().for_each(|warning| tell!("Warning: {warning}"));
-    Ok(conditions)
 }
 
 /// A value that `parser` reads. A shell's completion offers these names, but other words are also accepted.

@@ -294,17 +294,20 @@ fn ground_that_is_rolled_over_again_counts_once_and_another_row_for_itself() {
 
 #[test]
 fn plants_that_a_start_sees_again_count_once_and_another_row_for_itself() {
-    // Half metres. A plant stands after each metre. The machine is drawn back in hold, and starts again.
+    // Half metres. A plant of 350 mm stands every metre, one of them in the beam at each start. The machine is drawn
+    // back in hold.
     for (back_to, expected) in [(5, 5), (1, 9)] {
         let entry = |kind, text: &str| Entry { number: 1, time_ms: 0, kind, text: text.to_owned() };
         let mut log = vec![entry(Kind::Connected, "0.2.0"), entry(Kind::Setting, "ticks_per_m=2000")];
-        let (back, on) = ((back_to..8).rev().map(|at| ("hold", at)), (back_to..=10).map(|at| ("work", at)));
-        for (state, at) in (1..=8).map(|at| ("work", at)).chain(back).chain(on) {
+        let (back, on) = ((back_to..8).rev().map(|at| ("hold", 8, at)), (back_to..=10).map(|at| ("work", back_to, at)));
+        for (state, start, at) in (1..=8).map(|at| ("work", 1, at)).chain(back).chain(on) {
             let time_ms = 200 * log.len() as u64;
             let text = format!("state={state} tool=out pos={} speed_mm_s=0 windows=0 unseen_mm=400", 1000 * at);
             log.push(Entry { time_ms, ..entry(Kind::Status, &text) });
             if state == "work" && at % 2 == 0 {
-                let text = format!("plant pos={} votes=3 spacing=0 delay=0 hold=0 actuation=0", 1000 * at - 600);
+                let (seen, trailing) = (i64::max(1000 * at - 1600, 1000 * start), 1000 * at - 900);
+                let hold = trailing - seen + 200;
+                let text = format!("plant pos={seen} votes=3 spacing=0 delay=0 hold={hold} actuation=0");
                 log.push(Entry { time_ms, ..entry(Kind::Event, &text) });
             }
         }

@@ -228,4 +228,10 @@ impl Follower {
     pub fn mm(&self, position: i32) -> Option<f64> {
         self.distance.at(position, self.tick_mm())
     }
+
+    /// The width in mm of a detection whose tool stays out for `hold` ticks: a margin lies at either edge.
+    pub fn width_mm(&self, hold: i32) -> f64 {
+        let margin_mm = f64::from(self.in_use.settings().get(Setting::MarginMm));
+        (f64::from(hold) * self.tick_mm() - 2.0 * margin_mm).max(0.0)
+    }
 }

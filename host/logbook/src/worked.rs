@@ -58,8 +58,8 @@ pub fn worked(log: &[Entry]) -> Vec<Worked> {
     let mut stretches = Vec::new();
     let mut follower = Follower::default();
     let mut open: Option<Open> = None;
-    // The leading edges of plants since the distance began.
-    let mut plants_mm: Vec<f64> = Vec::new();
+    // The plants since the distance began, from leading to trailing edge, and the row's farthest status.
+    let (mut plants_mm, mut row_mm): (Vec<Range<f64>>, f64) = (Vec::new(), f64::NEG_INFINITY);
     // The last status: its time, its distance in mm, and its speed in mm/s.
     let mut last: Option<(u64, f64, f64)> = None;
     let (mut session, mut before_ms, mut was_work) = (0, 0, false);
@@ -72,15 +72,17 @@ pub fn worked(log: &[Entry]) -> Vec<Worked> {
             Followed::Linked => None,
             Followed::Status(status, goes_on) => {
                 if !goes_on {
-                    plants_mm.clear();
+                    (plants_mm, row_mm) = (Vec::new(), f64::NEG_INFINITY);
                 }
                 now_mm = follower.mm(status.position);
                 let is_work = status.mode == Mode::Work;
                 if let Some(mm) = now_mm.filter(|_| is_work && !was_work && status.unseen_mm > 0) {
-                    // `start` has forgotten the ground: the beam sees the plants ahead of it again.
-                    let is_next_row = plants_mm.last().is_some_and(|last_mm| last_mm - mm > 1000.0 * NEXT_ROW_M);
-                    plants_mm.retain(|plant_mm| *plant_mm < mm && !is_next_row);
+                    // `start` has forgotten the ground: the beam sees again the plants that end ahead of it.
+                    let is_next_row = row_mm - mm > 1000.0 * NEXT_ROW_M;
+                    plants_mm.retain(|plant_mm| plant_mm.end < mm && !is_next_row);
+                    row_mm = if is_next_row { mm } else { row_mm };
                 }
+                row_mm = now_mm.map_or(row_mm, |mm| row_mm.max(mm));
                 was_work = is_work;
                 let speed_mm_s = f64::from(status.speed_mm_s);
                 last = now_mm.map(|mm| (entry.time_ms, mm, speed_mm_s));
@@ -89,8 +91,9 @@ pub fn worked(log: &[Entry]) -> Vec<Worked> {
             }
             Followed::Event(EventLine::State { mode }) => Some(*mode),
             Followed::Event(EventLine::Alarm { .. }) => Some(Mode::Alarm),
-            Followed::Event(EventLine::Detection { class, position, .. }) => {
-                plants_mm.extend(follower.mm(*position).filter(|_| *class != Class::Weed));
+            Followed::Event(EventLine::Detection { class, position, hold, .. }) => {
+                let leading_mm = follower.mm(*position).filter(|_| *class != Class::Weed);
+                plants_mm.extend(leading_mm.map(|mm| mm..mm + follower.width_mm(*hold)));
                 continue;
             }
             Followed::Event(EventLine::Swing { out: true, .. }) => {
@@ -117,8 +120,7 @@ pub fn worked(log: &[Entry]) -> Vec<Worked> {
             _ => {}
         }
         if mode.is_none() {
-            plants_mm.clear();
-            last = None;
+            (plants_mm, row_mm, last) = (Vec::new(), f64::NEG_INFINITY, None);
         }
     }
     stretches.extend(open.map(|open| open.end(&plants_mm, &follower)));
@@ -148,12 +150,12 @@ impl Open {
         }
     }
 
-    fn end(self, plants_mm: &[f64], follower: &Follower) -> Worked {
+    fn end(self, plants_mm: &[Range<f64>], follower: &Follower) -> Worked {
         let beam_to_tool_mm = f64::from(follower.in_use().settings().get(Setting::BeamToToolMm));
         let beam_mm = self.beam_mm.filter(|_| self.goes_on);
         let passed = |ground_mm: &Range<f64>| {
             let tool_mm = ground_mm.start - beam_to_tool_mm..ground_mm.end - beam_to_tool_mm;
-            plants_mm.iter().filter(|mm| tool_mm.contains(mm)).count() as u32
+            plants_mm.iter().filter(|plant_mm| tool_mm.contains(&plant_mm.start)).count() as u32
         };
         Worked {
             plants: beam_mm.as_ref().map(passed),
@@ -242,25 +244,29 @@ mod tests {
 
     #[test]
     fn plants_that_a_start_sees_again_count_once_and_those_of_another_row_do_not() {
-        // Half a metre from plant to plant. The machine is drawn back in hold from 3 m, and starts again.
-        for (back_to_mm, expected) in [(1500, 21), (500, 22)] {
+        // Plants of 150 mm every half metre. The machine is held after 3 m, drawn back from there, and starts again, at
+        // 1800 mm with the beam in a plant.
+        for (held_mm, back_to_mm, expected) in [(3000, 1500, 21), (3000, 1800, 20), (3000, 500, 22), (4000, 1500, 20)] {
             let (mut text, mut time_ms) = (HEAD.to_owned(), 0);
             let mut line = |kind: &str, said: &str| {
                 time_ms += 100;
                 writeln!(text, "{time_ms},{kind},{said}").expect("a string takes all");
             };
-            for (from_mm, until_mm) in [(0, 3000), (back_to_mm, 12_000)] {
+            for (from_mm, until_mm, held_mm) in [(0, 3000, held_mm), (back_to_mm, 12_000, 12_000)] {
                 line("status", &status("hold", from_mm, 0));
                 line("event", "state is=work");
                 line("status", &status("work", from_mm, 0).replace("unseen_mm=0", "unseen_mm=450"));
-                for mm in (from_mm + 250..until_mm).step_by(500) {
-                    line("event", &format!("plant pos={mm} votes=3 spacing=0 delay=0 hold=0 actuation=0"));
-                    line("status", &status("work", mm + 250, 0));
+                for plant_mm in (175..until_mm).step_by(500).filter(|plant_mm| plant_mm + 150 > from_mm) {
+                    // The margin of 50 mm lies at either edge.
+                    let (seen_mm, hold) = (from_mm.max(plant_mm), plant_mm + 250 - from_mm.max(plant_mm));
+                    line("event", &format!("plant pos={seen_mm} votes=3 spacing=0 delay=0 hold={hold} actuation=0"));
+                    line("status", &status("work", plant_mm + 325, 0));
                 }
                 line("event", "state is=hold");
+                line("status", &status("hold", held_mm, 0));
             }
             // The tool is 400 mm behind the beam.
-            assert_eq!(of(&text)[1].plants, Some(expected), "{back_to_mm}");
+            assert_eq!(of(&text)[1].plants, Some(expected), "{held_mm} {back_to_mm}");
         }
     }
 

@@ -28,6 +28,9 @@ const FRAME_MS: f64 = 20.0;
 /// Pulses are whole steps of this, us, rounded outwards.
 const PULSE_STEP_US: f64 = 5.0;
 
+/// A lower top speed is a multiple of this, mm/s. That leaves some room for a longer lead.
+const SPEED_STEP_MM_S: u16 = 50;
+
 /// The required swing.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Swing {
@@ -153,14 +156,20 @@ impl Swing {
                 ));
             }
         }
+        let (arm_margin_mm, lift_mm) = if inputs.arm_trails > 0 { (carried_mm.ceil(), 0.0) } else { (0.0, stroke_mm) };
+        // A trailing arm needs a wider margin. The board's may be measured, and then it has the arm's part.
+        let wide_mm = if arm_margin_mm > 0.0 { f64::from(Setting::MarginMm.default()) + arm_margin_mm } else { 0.0 };
+        let margin_mm = (wide_mm as u16).clamp(settings.get(Setting::MarginMm), Setting::MarginMm.greatest());
+        // Margin and speeds are in their ranges.
+        let _ = after.set(Setting::MarginMm, margin_mm);
         let board_mm_s = settings.get(Setting::TopSpeedMmS);
-        let allowed_mm_s = (Setting::TopSpeedMmS.least()..=board_mm_s).rev().find(|&mm_s| {
-            // It is at most the board's, and in its range.
+        let speeds = (Setting::TopSpeedMmS.least()..=board_mm_s).rev();
+        let mut speeds = speeds.filter(|mm_s| *mm_s == board_mm_s || mm_s.is_multiple_of(SPEED_STEP_MM_S));
+        let allowed_mm_s = speeds.find(|&mm_s| {
             let _ = after.set(Setting::TopSpeedMmS, mm_s);
             after.contradiction().is_none()
         });
         let allowed_mm_s = allowed_mm_s.ok_or_else(|| after.contradiction().map(explain).unwrap_or_default())?;
-        let (arm_margin_mm, lift_mm) = if inputs.arm_trails > 0 { (carried_mm, 0.0) } else { (0.0, stroke_mm) };
         Ok(Self {
             stem_zone_mm: stem_zone_mm.ceil() as u32,
             angle_degrees,
@@ -172,16 +181,20 @@ impl Swing {
             top_speed_mm_s: (allowed_mm_s < board_mm_s).then_some(allowed_mm_s.into()),
             lead_out_ms: lead_out_ms as u32,
             lead_in_ms: lead_in_ms as u32,
-            arm_margin_mm: arm_margin_mm.ceil() as u32,
+            arm_margin_mm: arm_margin_mm as u32,
             lift_mm,
             unweeded_strip_mm: (from_mm - tool_mm / 2.0).max(0.0),
             filling_tool_mm: 2.0 * from_mm,
         })
     }
 
-    /// The settings that follow.
+    /// The settings that follow, in an order that the firmware of a new board takes.
     pub fn settings(&self) -> Vec<(&'static str, u32)> {
-        let pulses = [("servo_in_us", self.servo_in_us), ("servo_out_us", self.servo_out_us)];
+        let mut pulses = [("servo_in_us", self.servo_in_us), ("servo_out_us", self.servo_out_us)];
+        if self.servo_in_us == u32::from(Setting::ServoOutUs.default()) {
+            // In between, both pulses would be equal.
+            pulses.reverse();
+        }
         let slower = self.top_speed_mm_s.map(|mm_s| ("top_speed_mm_s", mm_s));
         let leads = [("lead_out_ms", self.lead_out_ms), ("lead_in_ms", self.lead_in_ms)];
         let zone = (self.stem_zone_mm > 0).then_some(("stem_zone_mm", self.stem_zone_mm));
@@ -331,18 +344,26 @@ mod tests {
     #[test]
     fn the_firmware_takes_each_line_and_a_long_lead_comes_with_the_highest_speed_for_it() {
         // The soil's torque on the paper's blade, and on one of 2.5 mm.
-        for (kg_cm, is_slower) in [(39.4, true), (10.0, false)] {
-            let swing = Swing::of(&Machine::default(), KG_CM.of(kg_cm)).expect("it swings");
+        // The trailing arm's margin is 26 mm wider. A new board's tool is out at the third pulse.
+        for (kg_cm, arm_trails, pulse_in, slower_mm_s) in
+            [(39.4, 0, 1500.0, Some(1150)), (39.4, 1, 1500.0, Some(1100)), (10.0, 0, 2000.0, None)]
+        {
+            let mut machine = Machine::default();
+            (machine.swing.arm_trails, machine.swing.pulse_in) = (arm_trails, pulse_in);
+            let swing = Swing::of(&machine, KG_CM.of(kg_cm)).expect("it swings");
             let mut settings = Settings::new();
             for (name, value) in swing.settings() {
                 let setting = Setting::find(name.as_bytes()).expect("it is a setting");
                 settings.change(setting, value as u16).expect("it is in its range");
                 assert_eq!(settings.contradiction(), None, "{name} {value}");
             }
-            assert_eq!(swing.top_speed_mm_s.is_some(), is_slower, "{swing:?}");
-            let faster_mm_s = settings.get(Setting::TopSpeedMmS) + 1;
+            assert_eq!(swing.top_speed_mm_s, slower_mm_s, "{swing:?}");
+            let margin_mm = Setting::MarginMm.default() + swing.arm_margin_mm as u16;
+            settings.set(Setting::MarginMm, margin_mm).expect("it is in its range");
+            assert_eq!(settings.contradiction(), None, "{margin_mm}");
+            let faster_mm_s = settings.get(Setting::TopSpeedMmS) + SPEED_STEP_MM_S;
             settings.set(Setting::TopSpeedMmS, faster_mm_s).expect("it is in its range");
-            assert!(!is_slower || settings.contradiction().is_some(), "{faster_mm_s}");
+            assert!(slower_mm_s.is_none() || settings.contradiction().is_some(), "{faster_mm_s}");
         }
         let mut near = Settings::new();
         near.set(Setting::BeamToToolMm, 100).expect("it is in its range");

@@ -15,6 +15,9 @@ use tokio::sync::broadcast::{self, Receiver};
 /// Most messages of a machine that a page may be behind: some ten seconds of work.
 const BEHIND: usize = 128;
 
+/// This warning stays until all settings are saved.
+const OLDER: &str = "warning name=settings_older";
+
 /// A message to the pages.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Message {
@@ -70,7 +73,13 @@ impl Hub {
         match news["is"].as_str().unwrap_or_default() {
             "there" | "lost" => *known = news,
             "restarted" => state.restarted[machine] = Some(news),
-            what @ ("status" | "settings" | "examples") if known["is"] == "there" => known[what] = news["said"].clone(),
+            what @ ("status" | "settings" | "examples") if known["is"] == "there" => {
+                known[what] = news["said"].clone();
+                // A line says what is saved only if that differs.
+                if what == "settings" && known["warning"] == OLDER && !news["said"].to_string().contains("saved") {
+                    known["warning"] = Value::Null;
+                }
+            }
             "event" => match EventLine::parse(news["said"].as_str().unwrap_or_default()) {
                 Some(EventLine::Warning { .. }) => known["warning"] = news["said"].clone(),
                 Some(event) if ends_warning(event, &known["warning"]) => known["warning"] = Value::Null,
@@ -134,8 +143,8 @@ impl Hub {
 /// Whether an event ends a warning, as in page/src/panel/machine.ts.
 fn ends_warning(event: EventLine, warning: &Value) -> bool {
     match event {
-        EventLine::State { mode } => mode == Mode::Hold,
-        EventLine::Detection { .. } => warning == "warning name=no_plants",
+        EventLine::State { mode: Mode::Hold } => warning != OLDER,
+        EventLine::State { .. } | EventLine::Detection { .. } => warning == "warning name=no_plants",
         _ => false,
     }
 }
@@ -189,20 +198,31 @@ mod tests {
     }
 
     #[test]
-    fn a_new_page_gets_a_warning_until_hold_and_that_no_plants_come_until_a_detection() {
+    fn a_new_page_gets_a_warning_until_it_ends() {
         let hub = Hub::new(1, 5000, Box::new(Moment::now));
         hub.news(0, json!({ "is": "there" }));
         let detection = "unknown pos=9 votes=0 spacing=8 delay=7 hold=3 actuation=10";
-        for (said, warning) in [
-            ("warning name=no_plants", json!("warning name=no_plants")),
-            ("state is=work", json!("warning name=no_plants")),
-            (detection, Value::Null),
-            ("warning name=late_command", json!("warning name=late_command")),
-            (detection, json!("warning name=late_command")),
-            ("state is=hold", Value::Null),
+        let (no_plants, late) = ("warning name=no_plants", "warning name=late_command");
+        let event = |said: &str| json!({ "is": "event", "said": said });
+        let settings = |saved| json!({ "is": "settings", "said": [format!("k=5 from 1 to 15, default 3{saved}")] });
+        for (news, warning) in [
+            (event(no_plants), json!(no_plants)),
+            (event("state is=work"), Value::Null),
+            (event(no_plants), json!(no_plants)),
+            (event(detection), Value::Null),
+            (event(late), json!(late)),
+            (event(detection), json!(late)),
+            (event("state is=work"), json!(late)),
+            (settings(""), json!(late)),
+            (event("state is=hold"), Value::Null),
+            (event(OLDER), json!(OLDER)),
+            (event("state is=hold"), json!(OLDER)),
+            (settings(", saved 3"), json!(OLDER)),
+            (settings(", not saved"), json!(OLDER)),
+            (settings(""), Value::Null),
         ] {
-            hub.news(0, json!({ "is": "event", "said": said }));
-            assert_eq!(read(&hub.listen().0[0])["warning"], warning, "{said}");
+            hub.news(0, news.clone());
+            assert_eq!(read(&hub.listen().0[0])["warning"], warning, "{news}");
         }
     }
 }

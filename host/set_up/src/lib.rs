@@ -183,11 +183,15 @@ impl SetUp {
 
     fn take_answer(&mut self, line: &str) {
         let Some((setting, value)) = shown(line) else { return };
-        // A value out of range is noise.
-        let _ = self.settings.set(setting, value);
         if setting == Setting::TicksPerM && self.measures_the_wheel {
+            if !self.is_measured(self.settings.get(setting)) {
+                // They were of another wheel.
+                self.ticks_per_m.clear();
+            }
             self.ticks_per_m.push(value);
         }
+        // A value out of range is noise.
+        let _ = self.settings.set(setting, value);
     }
 
     fn take_event(&mut self, event: &EventLine) {

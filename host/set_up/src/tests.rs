@@ -15,7 +15,7 @@ const MEASURED: &[&str] = &[
     "> calibrate 10000",
     "ticks_per_m=1910 from 0 to 20000, default 0, not saved",
     "> get ticks_per_m",
-    "ticks_per_m=1700 from 0 to 20000, default 0, not saved",
+    "ticks_per_m=1910 from 0 to 20000, default 0, not saved",
     "> calibrate 10000 force",
     "ticks_per_m=1930 from 0 to 20000, default 0, not saved",
     "ok",
@@ -69,6 +69,11 @@ fn a_wheel_whose_value_in_use_was_not_measured_is_to_be_measured_again() {
     }
     for (typed, kept) in [("> set ticks_per_m 1915", 3), ("> set ticks_per_m 1500", 0)] {
         assert_eq!(heard(&[MEASURED, THIRD, &[typed]]).ticks_per_m.len(), kept, "{typed}");
+    }
+    // Pushed from a file, or back at 0 because of another wheel.
+    for (shown, kept) in [("ticks_per_m=1915", 3), ("ticks_per_m=1500", 0), ("ticks_per_m=0", 0)] {
+        let set_up = heard(&[MEASURED, THIRD, &["> get", shown, "> calibrate 10000", "ticks_per_m=1528"]]);
+        assert_eq!(set_up.ticks_per_m.len(), kept + 1, "{shown}");
     }
 }
 

@@ -92,6 +92,9 @@ export class Machine {
                 break;
             case "settings":
                 this.settings = happening.settings;
+                // A line says what is saved only if that differs.
+                if (this.warning === "settings_older" && !happening.lines.join().includes("saved"))
+                    this.warning = undefined;
                 break;
             case "examples":
                 this.examples = happening.examples;
@@ -126,7 +129,8 @@ export class Machine {
                 this.mode = event.mode;
                 if (event.mode === "work") this.restarted = undefined;
                 if (event.mode !== "alarm") this.alarm = undefined;
-                if (event.mode === "hold") this.warning = undefined;
+                if (event.mode === "hold" ? this.warning !== "settings_older" : this.warning === "no_plants")
+                    this.warning = undefined;
                 break;
             case "swing":
                 this.toolOut = event.out;

@@ -63,6 +63,8 @@ export async function showServed(into: HTMLElement): Promise<Panel[]> {
     document.addEventListener("visibilitychange", comeToFront);
     comeToFront();
     served.listen();
+    // A tab that is loaded hidden listens once it is in front.
+    served.isBehind = document.hidden;
     return panels;
 }
 

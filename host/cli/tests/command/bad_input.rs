@@ -49,6 +49,18 @@ fn a_field_s_second_beam_that_the_distance_removes_is_named() {
 }
 
 #[test]
+fn a_distance_that_is_not_set_gets_a_warning_and_one_that_is_set_gets_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let field = "[machine]\nbeam_to_tool_mm = 500\n[settings]\nbeam_to_tool_mm = 600\n";
+    fs::write(folder.path().join("field.toml"), field).unwrap();
+    for (distance, warning) in [("600", ""), ("700", "is 600, but the simulated machine has 700.")] {
+        let words = ["sim", "--elf", "no.elf", "--field", "field.toml", "--beam-to-tool", distance];
+        let message = String::from_utf8_lossy(&weeder(folder.path(), &words).stderr).into_owned();
+        assert!(message.contains(warning) && message.contains("Warning") != warning.is_empty(), "{message}");
+    }
+}
+
+#[test]
 fn canopies_wider_than_their_spacing_are_refused() {
     assert_refused(&["sim", "--spacing", "100", "--canopy", "150"], "--spacing has to exceed --canopy");
 }

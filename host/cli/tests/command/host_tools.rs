@@ -359,6 +359,7 @@ fn ports_logs_and_recordings_that_do_not_exist_are_named() {
     assert!(printed(&output, 2).contains("no-such.csv cannot be read"));
 }
 
+#[cfg(target_os = "linux")]
 #[test]
 fn a_terminated_virtual_uno_removes_its_link() {
     let folder = tempfile::tempdir().expect("there is room for a link");

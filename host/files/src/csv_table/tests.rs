@@ -98,14 +98,15 @@ fn a_wrong_table_is_refused_with_the_line_and_what_would_be_right() {
 fn a_heading_that_may_mean_a_column_that_a_table_may_lack_is_asked_about() {
     let optional = |header: &str| {
         let table = CsvTable::parse(Path::new("table.csv"), format!("# May\n{header}\n7,1\n").into(), &[]);
-        table.unwrap().with_optional(&["plot"]).map(drop).map_err(|error| error.to_string())
+        table.unwrap().with_optional(&["plot", "row", "position", "label"]).map(drop).map_err(|error| error.to_string())
     };
-    for heading in ["Plot", "PLOT", "plot no", "Plots"] {
+    for heading in ["Plot", "PLOT", "plot no", "Plots", "Plot Nr.", "plot_id", "Plot #"] {
         let question = format!("the column `plot` is missing: did you mean plot by `{heading}`? If not, ");
         let error = optional(&format!("place_mm,{heading}")).unwrap_err();
         assert!(error.starts_with(&format!("table.csv, line 2: {question}")), "{error}");
     }
-    for header in ["plot,place_mm", "place_mm,pilot", "Plot no,plot"] {
+    let others = "plot_area,Plot length m,row_spacing,position_mm,label colour";
+    for header in ["plot,place_mm", "place_mm,pilot", "Plot no,plot", others] {
         assert_eq!(optional(header), Ok(()), "{header}");
     }
 }

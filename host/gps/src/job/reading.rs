@@ -4,7 +4,6 @@ use super::{Did, Event, EventKind, Ground};
 use crate::receiver::{Fix, WHEEL_GAP_MS};
 use crate::track::STANDING_M;
 use control::say::command::Action;
-use link::settings::Setting;
 use link::{Class, EventLine, Mode, Status};
 use logbook::follower::Follower;
 use logbook::log::{Entry, Kind};
@@ -95,11 +94,12 @@ impl Reading {
             None => self.ground.push(Ground::begin(did, at_m, entry.time_ms)),
             Some((passed, _)) if (passed == Did::Rolled) != (did == Did::Rolled) => {
                 self.turn_to(did, at_m, entry.time_ms);
-                // `start` forgets the ground: the beam sees what is ahead of it again.
+                // `start` forgets the ground: the beam sees again what ends ahead of it.
                 if did != Did::Rolled && status.unseen_mm > 0 {
                     let row = self.events.split_off(self.row_from);
                     let is_seen = |kind: EventKind| matches!(kind, EventKind::Detection { .. } | EventKind::Guarded);
-                    self.events.extend(row.into_iter().filter(|it| it.distance_m < at_m || !is_seen(it.kind)));
+                    let is_behind = |it: &Event| it.distance_m + it.width_mm / 2000.0 < at_m;
+                    self.events.extend(row.into_iter().filter(|it| is_behind(it) || !is_seen(it.kind)));
                 }
             }
             Some((_, start_m)) => {
@@ -154,9 +154,7 @@ impl Reading {
         let metres = |position| follower.mm(position).map(|mm| mm / 1000.0);
         let (kind, position, width_mm) = match *event {
             EventLine::Detection { class, position, votes, hold, .. } => {
-                let margin_mm = f64::from(follower.in_use().settings().get(Setting::MarginMm));
-                let width_mm = (f64::from(hold) * follower.tick_mm() - 2.0 * margin_mm).max(0.0);
-                (EventKind::Detection { class, votes }, position, width_mm)
+                (EventKind::Detection { class, votes }, position, follower.width_mm(hold))
             }
             EventLine::Guarded { position } => (EventKind::Guarded, position, 0.0),
             EventLine::Swing { out, position } => {
