@@ -97,7 +97,8 @@ fn a_wrong_table_is_refused_with_the_line_and_what_would_be_right() {
 #[test]
 fn a_heading_that_may_mean_a_column_that_a_table_may_lack_is_asked_about() {
     let optional = |header: &str| {
-        let table = CsvTable::parse(Path::new("table.csv"), format!("# May\n{header}\n7,1\n").into(), &[]);
+        let line = vec!["7"; header.split(',').count()].join(",");
+        let table = CsvTable::parse(Path::new("table.csv"), format!("# May\n{header}\n{line}\n").into(), &[]);
         table.unwrap().with_optional(&["plot", "row", "position", "label"]).map(drop).map_err(|error| error.to_string())
     };
     for heading in ["Plot", "PLOT", "plot no", "Plots", "Plot Nr.", "plot_id", "Plot #"] {
