@@ -87,8 +87,12 @@ impl Ground {
     /// Starts detection on unknown ground, with the distances of the last [`follow`](Self::follow). The beam is at `position`;
     /// `broken` is its level.
     pub fn begin(&mut self, position: Position, broken: bool) {
+        let has_rolled_back = self.has_rolled_back();
         self.beam = self.geometry.scale.wrap(position);
         self.begin_here(broken);
+        if has_rolled_back {
+            self.keep_out.mark_dropped();
+        }
     }
 
     /// Recalculates the distances after a change of settings. [`catch_up`](Self::catch_up) then recalculates the leads. A new scale
@@ -172,7 +176,11 @@ impl Ground {
         }
         self.guard = Guard::NONE;
         self.distrust_slip();
+        let has_left = self.has_left();
         self.keep_out.invalidate(self.detector.frontier());
+        if has_left {
+            self.keep_out.mark_dropped();
+        }
     }
 
     /// Edges of the beams were lost, so this ground is unknown. The beams' levels are now `broken` and `second_broken`.

@@ -88,7 +88,7 @@ settings! {
     /// Consecutive narrow detections without a plant that raise an alarm; 0 for never.
     MisfitAfter "misfit_after": 0 to 100, 5, false,
         "alarm at so many narrow detections in a row; 0 never";
-    BeamResponseMs "beam_response_ms" in "ms": 0 to 50, 1, false,
+    BeamResponseMs "beam_response_ms" in "ms": 0 to 50, 1, true,
         "time the beam takes to answer";
     /// Highest speed for work. With the default lead and margin, the default beam allows 1330 mm/s.
     TopSpeedMmS "top_speed_mm_s" in "mm/s": 100 to 3000, 1300, false,

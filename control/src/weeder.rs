@@ -423,7 +423,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     fn enter(&mut self, state: State) {
         // `hold` and the switch also end a manual test.
-        (self.manual_test, self.was_working) = (ManualTest::Idle, false);
+        self.manual_test = ManualTest::Idle;
+        self.was_working &= matches!(state, State::Alarm(_));
         self.tool.forget_swings();
         if state != self.state {
             self.state = state;

@@ -173,6 +173,11 @@ fn a_reset_at_work_is_told_in_greeting_and_status_until_the_operator_starts_or_h
             assert_eq!(machine.works_or_did(), line == "start");
         }
     }
+    let (_, mut machine) = after_a_reset_at_work(Cause::BrownOut);
+    machine.lose_edges(Beams::default());
+    assert!(machine.ask("status")[1].contains(" was=work") && machine.works_or_did(), "an alarm does not hide it");
+    assert_eq!(machine.ask("clear"), ["ok"]);
+    assert!(!machine.ask("status")[1].contains(" was=work"));
     let (greeting, mut machine) = after_a_reset_at_work(Cause::PowerOn);
     assert!(greeting.contains(", reset by power_on, state hold"), "SRAM is random then: {greeting}");
     assert!(machine.ask("status")[1].ends_with(" reset=power_on"));

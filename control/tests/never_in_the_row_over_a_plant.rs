@@ -9,7 +9,8 @@ mod rolling;
 
 use common::machine;
 use control::{
-    operate::{event::Event, servo},
+    alarm::Alarm,
+    operate::{event::Event, servo, state::State},
     settings::Setting,
     units::Ticks,
 };
@@ -253,6 +254,18 @@ fn work_begins_on_ground_that_the_beam_has_yet_to_see() {
 }
 
 #[test]
+fn start_now_after_rolling_back_too_far_at_work_waits() {
+    let mut rolling = Rolling::along(Vec::new(), Vec::new(), &[]);
+    rolling.roll_to(9000.0, 500.0);
+    rolling.roll_to(980.0, 500.0);
+    assert_eq!(rolling.machine.state(), State::Alarm(Alarm::RolledBackTooFar));
+    rolling.machine.clear();
+    rolling.machine.start(true).unwrap();
+    rolling.roll_to(1000.0, 500.0);
+    assert!(rolling.machine.tool_out());
+}
+
+#[test]
 fn start_now_keeps_the_known_ground_after_a_jolt_back_but_not_after_rolling_back() {
     // Up to the margin, and beyond; also where the memory ends, and the beam sees the ground again.
     for (back_mm, keeps) in [(0.0, true), (40.0, true), (70.0, false), (3000.0, false), (8010.0, false)] {
@@ -263,5 +276,9 @@ fn start_now_keeps_the_known_ground_after_a_jolt_back_but_not_after_rolling_back
         rolling.machine.start(true).unwrap();
         rolling.roll_to(9010.0 - back_mm, 500.0);
         assert_eq!(rolling.machine.tool_out(), !keeps, "{back_mm} mm");
+        // Typed again, it opens nothing that it has forgotten.
+        rolling.machine.start(true).unwrap();
+        rolling.roll_to(9020.0 - back_mm, 500.0);
+        assert_eq!(rolling.machine.tool_out(), !keeps, "{back_mm} mm, again");
     }
 }

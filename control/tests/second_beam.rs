@@ -224,6 +224,17 @@ fn a_plant_that_only_the_second_beam_sees_is_not_reached_at_any_speed() {
 }
 
 #[test]
+fn a_leaf_that_only_the_second_beam_sees_within_a_wide_plant_does_not_let_the_tool_in() {
+    // As for a plant with leaves that the first beam does not part.
+    let second = vec![(1150.0, 1170.0)];
+    let slow = Rig::new(ByWidth::new(0, 14));
+    let mut rolling = Rolling::with(slow, vec![(1000.0, 1300.0)], second, &[(Setting::SecondBeamMm, 100)]);
+    rolling.roll_to(1500.0, 434.0);
+    let harm_mm = rolling.weeded_mm.iter().find(|&&mm| (1000.0 - 180.0..1300.0).contains(&mm));
+    assert_eq!(harm_mm, None, "the tool is out by the lead before the margin, and stays out");
+}
+
+#[test]
 fn another_wheel_or_beam_position_set_in_hold_resets_the_slip() {
     for (setting, value) in [(Setting::TicksPerM, 2100), (Setting::SecondBeamMm, 180), (Setting::BeamToToolMm, 420)] {
         let mut rolling = along(&plants(12)).slipping(10.0);
@@ -310,6 +321,23 @@ fn a_plant_missed_by_the_first_beam_is_not_mixed_up_with_the_next() {
         assert_eq!(rolling.alarms(), []);
         assert!(rolling.least_margin_mm(&both) > 0.0, "{behind_mm} mm: {}", rolling.least_margin_mm(&both));
     }
+}
+
+#[test]
+fn a_stalk_missed_by_the_first_beam_is_kept_behind_a_weed_that_both_see() {
+    let stalk = (5050.0, 5075.0);
+    let both = [
+        (1..=5).map(|plant| (700.0 * f64::from(plant), 700.0 * f64::from(plant) + 100.0)).collect(),
+        vec![(5000.0, 5015.0)],
+    ]
+    .concat();
+    let second = [&both[..], &[stalk]].concat();
+    let settings = [(Setting::BeamToToolMm, 1000), (Setting::SecondBeamMm, 600)];
+    // The weed's hold is 115 mm.
+    let mut rolling = Rolling::with(Rig::new(ByWidth::new(120, 0)), both, second, &settings);
+    rolling.roll_to(7000.0, 500.0);
+    assert!(rolling.machine.slip_permille().is_some() && rolling.alarms().is_empty(), "{:?}", rolling.told);
+    assert!(rolling.least_margin_mm(&[stalk]) > 0.0, "{:?}", rolling.told);
 }
 
 #[test]

@@ -65,11 +65,6 @@ impl Detector {
         self.broken
     }
 
-    /// Marks the next detection as possibly more than one plant.
-    pub fn doubt(&mut self) {
-        self.parted = true;
-    }
-
     /// Whether gaps show that the last complete detection may be more than one plant. Clears the mark.
     pub fn take_parted(&mut self) -> bool {
         core::mem::take(&mut self.parted)

@@ -20,6 +20,7 @@
 //! - If two detections fit, [`SecondBeam`] measures nothing. This happens in a dense stand. With more than five
 //!   detections between the beams, it measures nothing until these have passed.
 //! - It measures no slip beyond 30 %. It ignores detections so narrow that a beam may miss them.
+//! - A stalk that the first beam misses just ahead of a tall weed of its width may take the weed's place.
 //! - All tests simulate the beams. No real machine has shown that both see the same width of a canopy, or that
 //!   consecutive slips agree.
 
@@ -165,7 +166,9 @@ impl SecondBeam {
         for first in self.passed.iter().take(self.awaited.into()) {
             let (off, wider) = (detection.leading - first.leading, detection.width() - first.width);
             // At the expected position, with a tolerance for a change of slip.
-            if !is_over && self.slip.is_known() && (-near..=near).contains(&off.0) {
+            // Nor does one explain two: the other may be a plant that the first beam has missed.
+            let is_free = self.claimed & bit == 0;
+            if !is_over && is_free && self.slip.is_known() && (-near..=near).contains(&off.0) {
                 self.expected_to = position + first.width + same;
             }
             // From 25 % less to 50 % more: slip of 30 % in either direction.

@@ -74,8 +74,6 @@ impl Ground {
         if self.widen(detection.leading, detection.trailing) {
             return None;
         }
-        // Only one beam saw this, so it is not certain to be a single plant.
-        self.detector.doubt();
         Some(detection)
     }
 

@@ -34,7 +34,8 @@ pub(super) enum Known {
 impl Ground {
     /// Closes the ground from the start of a detection until it is classified.
     pub fn await_class(&mut self, detection: Detection, of_second: bool) {
-        let zone = if self.detector.take_parted() { Length::ZERO } else { self.geometry.stem_zone() };
+        // What only one beam saw is not certain to be a single plant.
+        let zone = if of_second || self.detector.take_parted() { Length::ZERO } else { self.geometry.stem_zone() };
         self.unclassified =
             Unclassified { detection, canopy: Canopy::of(&detection, zone), of_second, known: Known::Canopy };
         // A wide detection reaches the second beam before the first has seen its end.

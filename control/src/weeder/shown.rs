@@ -23,7 +23,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     pub fn reason(&self) -> Option<Reason> {
         if !self.is_working() || !self.tool.is_out() {
             None
-        } else if self.sensors.encoder.is_doubtful() || self.sensors.encoder.is_quiet() {
+        } else if self.sensors.encoder.is_doubtful()
+            // At slow rolling, a sound encoder is quiet for some turns.
+            || self.sensors.encoder.is_quiet() && !self.ground.must_be_out(true)
+        {
             Some(Reason::EncoderDoubtful)
         } else if self.ground.is_unseen() {
             Some(Reason::UnseenGround)
