@@ -57,8 +57,8 @@ impl Ground {
         let (near, far) = (self.tool() + one.min(other), self.tool() + one.max(other));
         let reaches = |leading| far - leading >= -margin;
         self.keep_out.is_closed(near, far, margin)
-            || self.open().is_some_and(reaches)
-            // A detection of the second beam lies ahead of a wide one that is open in the first.
+            // Both: a detection of the second beam lies ahead of a wide one that is open in the first.
+            || self.unclassified.known == Known::Canopy && reaches(self.unclassified.canopy.leading)
             || self.detector.open().is_some_and(reaches)
             || self.guard.awaited(self.detector.frontier(), &self.geometry).is_some_and(reaches)
             || self.second_beam.open_alone().is_some_and(reaches)
