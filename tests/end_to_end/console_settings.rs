@@ -129,6 +129,7 @@ fn settings_that_change_where_the_tool_is_are_refused_while_the_machine_works() 
         "stem_zone_mm",
         "servo_in_us",
         "servo_out_us",
+        "beam_response_ms",
     ];
     assert_eq!(refused, names);
 
