@@ -227,7 +227,6 @@ page.button("press-reset", () => simulation.uno.reset("external"));
 
 const time = page.get("time", HTMLSelectElement);
 const lamp = page.html("lamp");
-const hint = page.html("hint");
 const outcome = page.html("outcome");
 
 function showTrial(): void {
@@ -240,7 +239,6 @@ function showTrial(): void {
     page.write("outcome", inWords(totals));
     page.write("why", simulation.why);
     outcome.classList.toggle("damaged", totals.plants.damaged > 0);
-    hint.hidden = !(workSwitch.checked && tryPanel.machine.mode !== "work");
     if (isStill() && performance.now() - drawnMs < STILL_MS) return;
     drawnMs = performance.now();
     drawing.draw(simulation);

@@ -86,6 +86,40 @@ test("a fault that is made by a click takes the tool out, and its alarm shows un
     await close(opened);
 });
 
+test("no control moves under the pointer while the machine drives, and into its alarm", async () => {
+    for (const [screen, language] of [
+        [DESK, "en"],
+        [PHONE, "fr"],
+    ] as const) {
+        const opened = await open(browser, "try", screen);
+        const { page } = opened;
+        await weeds(page);
+        await page.locator("#language").selectOption(language);
+        const watched = page.evaluate(async () => {
+            const places = () =>
+                [...document.querySelectorAll("#view-try :is(button, input, select)")]
+                    .filter((control) => control.checkVisibility())
+                    .map((control): [Element, number] => {
+                        const scrolled = control.closest(".dock") ? 0 : scrollY;
+                        return [control, Math.round(control.getBoundingClientRect().bottom + scrolled)];
+                    });
+            const first = new Map(places());
+            const moved = new Set<string>();
+            while (!document.querySelector("#try-panel .alarm:not([hidden])")) {
+                await new Promise(requestAnimationFrame);
+                for (const [control, place] of places())
+                    if ((first.get(control) ?? place) !== place) moved.add(control.outerHTML);
+            }
+            return [...moved];
+        });
+        await rollTo(page, 4000);
+        await page.locator("#dead").check();
+        await pass(page, 5);
+        assert.deepEqual(await watched, []);
+        await close(opened);
+    }
+});
+
 test("a plant that was damaged is marked in the row, and told in words", async () => {
     const opened = await tryIt(browser);
     const { page } = opened;

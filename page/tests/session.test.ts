@@ -277,7 +277,7 @@ async function pressInAnyOrder(seed: number): Promise<string[]> {
 }
 
 test("in any order nothing starts that was told as not sent, and a HOLD that is pressed last holds", async (test) => {
-    const first = Number(process.env["WEEDER_SEED"] ?? 1);
+    const first = Number(process.env.WEEDER_SEED ?? 1);
     test.diagnostic(`WEEDER_SEED=${first}`);
     const ends: string[] = [];
     for (let seed = first; seed < first + RUNS; seed++) ends.push(...(await pressInAnyOrder(seed)));
