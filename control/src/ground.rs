@@ -90,9 +90,7 @@ impl Ground {
         let has_rolled_back = self.has_rolled_back();
         self.beam = self.geometry.scale.wrap(position);
         self.begin_here(broken);
-        if has_rolled_back {
-            self.keep_out.mark_dropped();
-        }
+        self.keep_out.mark_dropped(has_rolled_back);
     }
 
     /// Recalculates the distances after a change of settings. [`catch_up`](Self::catch_up) then recalculates the leads. A new scale
@@ -147,7 +145,7 @@ impl Ground {
         let is_beyond_memory = self.detector.frontier() - self.beam > memory;
         if is_beyond_memory {
             self.begin_here(self.detector.is_broken());
-            self.keep_out.mark_dropped();
+            self.keep_out.mark_dropped(true);
         }
         let complete = self.detector.roll_to(self.beam - self.leads.response, self.geometry.merge_gap());
         // Counted from the frontier: the beam is at most the memory behind it. From the tool, the distance could exceed the range
@@ -157,7 +155,11 @@ impl Ground {
         if farthest.is_ahead_of(self.last_plant) {
             self.last_plant = farthest;
         }
-        self.rolled_back_too_far = is_beyond_memory || (!had_left && self.has_left());
+        let has_left = self.has_left();
+        self.rolled_back_too_far = is_beyond_memory || (!had_left && has_left);
+        if had_left && !has_left {
+            self.keep_out.mark_dropped(false);
+        }
         complete
     }
 
@@ -178,9 +180,7 @@ impl Ground {
         self.distrust_slip();
         let has_left = self.has_left();
         self.keep_out.invalidate(self.detector.frontier());
-        if has_left {
-            self.keep_out.mark_dropped();
-        }
+        self.keep_out.mark_dropped(has_left);
     }
 
     /// Edges of the beams were lost, so this ground is unknown. The beams' levels are now `broken` and `second_broken`.

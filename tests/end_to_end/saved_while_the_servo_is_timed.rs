@@ -24,7 +24,7 @@ fn follow(uno: &mut Uno, duration_ms: u64) {
 #[test]
 fn settings_that_were_saved_are_whole_although_the_servos_swings_end_meanwhile() {
     let mut meanwhile = 0;
-    for save_at_ms in [17_850, 17_900, 17_950, 17_980, 18_000] {
+    for save_at_ms in [19_350, 19_400, 19_450, 19_480, 19_500] {
         let mut uno = started();
         uno.set(wiring::END_SWITCH, false);
         run_for_ms(&mut uno, 50);

@@ -122,9 +122,9 @@ impl KeepOut {
         self.has_dropped && self.known_from.is_ahead_of(position)
     }
 
-    /// The unknown ground was seen, and dropped.
-    pub fn mark_dropped(&mut self) {
-        self.has_dropped = true;
+    /// Whether the unknown ground was seen, and dropped. Once the tool has left it behind, it is unknown like any other.
+    pub fn mark_dropped(&mut self, has_dropped: bool) {
+        self.has_dropped = has_dropped;
     }
 
     /// Declares the ground known from `position` on. `position` lies behind the frontier.

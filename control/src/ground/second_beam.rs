@@ -165,8 +165,8 @@ impl SecondBeam {
         let (mut bit, mut fitting, mut travel, mut is_near) = (1_u8, 0_u8, Length::ZERO, false);
         for first in self.passed.iter().take(self.awaited.into()) {
             let (off, wider) = (detection.leading - first.leading, detection.width() - first.width);
-            // At the expected position, with a tolerance for a change of slip.
-            // Nor does one explain two: the other may be a plant that the first beam has missed.
+            // At the expected position, with a tolerance for a change of slip. Each detection of the first beam is
+            // expected once: another one there may be a plant that the first beam has missed.
             let is_free = self.claimed & bit == 0;
             if !is_over && is_free && self.slip.is_known() && (-near..=near).contains(&off.0) {
                 self.expected_to = position + first.width + same;

@@ -52,7 +52,10 @@ impl Distance {
         // Rounded up, so that the tolerance is exact.
         self.off_permille =
             ((u32::from(counted.abs_diff(nominal)) * 1000 + u32::from(nominal - 1)) / u32::from(nominal)) as u16;
-        if counted == 0 || self.off_permille > TOLERANCE_PERMILLE && !forced {
+        if counted == 0 {
+            return Err(CommandError::TooShort);
+        }
+        if self.off_permille > TOLERANCE_PERMILLE && !forced {
             return Err(CommandError::WheelDiffers);
         }
         Ok(counted)
@@ -112,7 +115,7 @@ pub enum Outcome {
 /// Timed swings of the tool. The end switch shows when the tool arrives and when it leaves.
 #[derive(Clone, Debug)]
 pub struct Swings {
-    /// Swings left, this one included; even numbers are swings in.
+    /// Swings left, this one included; even numbers are swings in. The first, out of the row, is not timed.
     left: u8,
     since: Coarse,
     /// Whether the switch has followed this swing.
@@ -124,14 +127,14 @@ pub struct Swings {
 }
 
 impl Swings {
-    /// Starts with a swing into the row. `watched` tells whether there is an end switch. `gap_ms` is the shortest gap between servo
+    /// Starts with a swing out of the row: the operator may have put the tool in. `watched` tells whether there is an end switch. `gap_ms` is the shortest gap between servo
     /// pulses; 0 stands for fixed frames.
     pub const fn new(now: Instant, watched: bool, gap_ms: u8) -> Self {
         let wait_ms = if gap_ms == 0 { FRAME_MS } else { gap_ms };
         Self {
-            left: 2 * ROUNDS,
+            left: 2 * ROUNDS + 1,
             since: now.coarse(),
-            followed: false,
+            followed: true,
             watched,
             spare_ms: SPARE_MS + wait_ms,
             leads: SwingTimes { out_ms: 0, in_ms: u16::MAX },
@@ -205,7 +208,7 @@ mod tests {
             (24_840, 10_000, false, differs(2484)),
             (13_360, 10_000, false, differs(1336)),
             (24_840, 10_000, true, Ok(2484)),
-            (0, 10_000, true, differs(0)),
+            (0, 10_000, true, Err((CommandError::TooShort, 0))),
             (i32::MIN, 1000, false, differs(u16::MAX)),
         ] {
             assert_eq!(end(ticks, length_mm, forced), expected, "{ticks} in {length_mm} mm");
@@ -237,7 +240,7 @@ mod tests {
     fn the_end_switch_gives_the_longest_swing_out_and_the_shortest_swing_in() {
         let (outcome, lasted_ms) = run([61, 180, 57, 195, 70, 170]);
         assert_eq!(outcome, Outcome::Measured(SwingTimes { out_ms: 195 + 11, in_ms: 57 - LATE_MS }));
-        assert_eq!(lasted_ms, 18_036);
+        assert_eq!(lasted_ms, 19_539);
     }
 
     #[test]

@@ -112,7 +112,7 @@ macro_rules! line_tables {
                     " late=#" count(machine.late()) => late: u16, "commands to the tool that came too late";
                     " missed=#" count(machine.events_missed()) => missed: u16,
                         "events that were dropped, because too many waited for the line";
-                    " mistakes=#" count(machine.command_errors()) => command_errors: u16, "console lines with an error";
+                    " mistakes=#" count(machine.command_errors()) => command_errors: u16, "console lines that are no command";
                     " dust=#" count(machine.dust()) => dust: u16, "detections narrower than `min_width_mm`";
                     " stack_free=#" count(machine.readings().stack_free) => stack_free: u16,
                         "bytes of stack that were never used";

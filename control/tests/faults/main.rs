@@ -101,6 +101,19 @@ fn rolling_back_to_ground_never_seen_takes_the_tool_out_and_is_no_alarm() {
 }
 
 #[test]
+fn rolling_back_over_the_start_line_is_no_alarm_after_a_start_behind_known_ground() {
+    let mut drive = Drive::at_work();
+    drive.roll(0.5, 4.0);
+    drive.machine.hold();
+    drive.roll(-0.5, 1.0);
+    drive.machine.start(false).unwrap();
+    drive.roll(0.5, 2.0);
+    assert!(drive.tool_is_in());
+    drive.roll(-0.5, 2.0);
+    assert_eq!((drive.alarm(), drive.machine.reason()), (None, Some(Reason::UnseenGround)));
+}
+
+#[test]
 fn a_tool_that_does_not_follow_is_an_alarm_with_an_end_switch() {
     // The switch never closes, although the tool is commanded out.
     let mut drive = Drive::in_hold();

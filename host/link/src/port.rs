@@ -208,7 +208,7 @@ pub fn claim(name: &str) -> Result<Claim, LinkError> {
     let lock = File::options().create(true).append(true).open(&path).or_else(|_| File::open(&path));
     let not_locked = |source| LinkError::NotClaimed { path: path.clone(), source };
     let lock = lock.map_err(not_locked)?;
-    // Other users lock it too, whatever this one's umask. It may be another user's.
+    // Other users lock it too, so the mode does not follow the umask. Setting it fails if the file is another user's.
     #[cfg(unix)]
     let _ = lock.set_permissions(std::os::unix::fs::PermissionsExt::from_mode(0o644));
     match lock.try_lock() {

@@ -34,6 +34,15 @@ fn clear_case() -> Vec<Labelled> {
     plants.chain(weeds).collect()
 }
 
+/// Weeds and plants of nearly the same widths, mixed along the row: every `share`th is a weed.
+fn mixed(share: i16, narrowest_plant_mm: i16, step_mm: i16) -> Vec<Labelled> {
+    let object = |n: i16| {
+        let (kind, narrowest_mm) = if n % share == 0 { (Kind::Weed, 4) } else { (Kind::Plant, narrowest_plant_mm) };
+        labelled(kind, 278, 60 + step_mm * n % 160, narrowest_mm + 19 * n % 17)
+    };
+    (0..24).map(object).collect()
+}
+
 #[test]
 fn each_detection_of_the_simulated_field_is_classified_right_by_all_others() {
     let objects = synthetic::objects(&CROPS[0], 1).unwrap();
@@ -171,13 +180,7 @@ fn a_few_detections_do_not_make_weeds_of_detections_nearer_to_plants() {
 
 #[test]
 fn a_table_that_cuts_plants_which_all_objects_together_spare_is_refused() {
-    // Plants and weeds of nearly the same widths, mixed along the row.
-    let object = |n: i16| {
-        let (kind, narrowest_mm) = if n % 3 == 0 { (Kind::Weed, 4) } else { (Kind::Plant, 14) };
-        labelled(kind, 278, 60 + 37 * n % 160, narrowest_mm + 19 * n % 17)
-    };
-    let objects: Vec<Labelled> = (0..24).map(object).collect();
-    let error = train(&objects, Some(11), DEFAULT_MOST_EXAMPLES).unwrap_err();
+    let error = train(&mixed(3, 14, 37), Some(11), DEFAULT_MOST_EXAMPLES).unwrap_err();
     assert!(error.to_string().starts_with("with a vote of 11, so few examples cut 1 plant "), "{error}");
 }
 
@@ -196,12 +199,8 @@ fn objects_that_need_more_examples_than_there_is_room_for_are_refused_by_name() 
 
 #[test]
 fn more_room_never_refuses_what_less_room_takes() {
-    // Weeds among narrow plants: a table filled up with plants would need more weeds.
-    let object = |n: i16| {
-        let (kind, narrowest_mm) = if n % 2 == 0 { (Kind::Weed, 4) } else { (Kind::Plant, 12) };
-        labelled(kind, 278, 60 + 41 * n % 160, narrowest_mm + 19 * n % 17)
-    };
-    let objects: Vec<Labelled> = (0..24).map(object).collect();
+    // A table filled up with plants would need more weeds.
+    let objects = mixed(2, 12, 41);
     for most in 4..=24 {
         let training = train(&objects, Some(3), most).unwrap();
         assert!(training.kept.len() <= most, "{most}");

@@ -135,8 +135,8 @@ impl Novice {
         let out_degrees = servo.stroke_degrees() - self.conditions.machine(0).clear_within_degrees;
         let now = |milliseconds: u32| Instant::new(0) + Interval::from_ms(milliseconds);
         let gap_ms = self.settings().get(Setting::ServoGapMs) as u8;
-        let mut decided = Swings::new(now(swing_ms), true, gap_ms);
-        let outcome = (swing_ms..).find_map(|milliseconds| {
+        let mut decided = Swings::new(now(0), true, gap_ms);
+        let outcome = (0..).find_map(|milliseconds| {
             let is_out = stroke.degrees(f64::from(milliseconds) / 1000.0) >= out_degrees;
             decided.step(now(milliseconds), is_out)
         });
