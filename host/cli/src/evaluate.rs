@@ -48,9 +48,6 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<()> {
     let folder = arguments.out.as_ref().map(|out| out.folder([REPORT], arguments.replace)).transpose()?;
     let mut records = evaluation::read_csv(&arguments.file)?;
-    if arguments.log.is_none() && records.iter().any(|record| record.plot == 0) {
-        tell!("The column plot does not number each plot once, so plots have the numbers of their lines.");
-    }
     let (analysis, joined) = match &arguments.log {
         Some(log) => {
             let levels_km_h = records.iter().map(|record| record.speed_km_h).collect();

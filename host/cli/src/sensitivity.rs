@@ -42,7 +42,7 @@ Examples:
   weeder sensitivity sensors.unseen_percent=2,guard_spacing_mm=500,guard_scatter_mm=40    two settings belong together
 `weeder sweep --help` lists the names.")]
 pub struct Arguments {
-    /// The changes, each tried by itself.
+    /// The changes, each tried by itself. The guard of 500 mm is for plants 50 cm apart.
     #[arg(value_name = "NAME=VALUE[,NAME=VALUE]", default_values = CHANGES)]
     changes: Vec<Change>,
     /// The field: a preset or a TOML file, as for `weeder trial`.

@@ -34,6 +34,8 @@ pub struct Analysis {
     pub levels_km_h: Vec<f64>,
     /// The analysis of each measure, in the order of [`Response::ALL`].
     pub responses: Vec<ResponseAnalysis>,
+    /// Whether a plot had no number of its own, so that all are numbered in the order of the records.
+    pub is_renumbered: bool,
 }
 
 /// The analysis of one measure over all plots.
@@ -68,7 +70,7 @@ pub struct Treatment {
     pub spacing_cm: f64,
     /// How many plots there are.
     pub plots: usize,
-    /// The mean of each measure over the plots that have it.
+    /// The mean of each measure over the plots that have it, and the damage of all their plants together.
     pub mean: Performance,
     /// Damaged plants of all these plots together.
     pub damaged: Share,
@@ -91,14 +93,15 @@ impl Analysis {
     /// # Errors
     /// As [`of`](Self::of), and if a plot is far from each nominal speed.
     pub fn at_speeds(mut records: Vec<PlotRecord>, nominal_km_h: &[f64]) -> Result<Self> {
-        if records.iter().any(|record| record.plot == 0) {
+        let is_renumbered = records.iter().any(|record| record.plot == 0);
+        if is_renumbered {
             (1..).zip(&mut records).for_each(|(number, record)| record.plot = number);
         }
         let levels_km_h = match nominal_km_h {
             [] => records.iter().map(|record| record.speed_km_h).collect(),
             nominal_km_h => nominal::nearest(&records, nominal_km_h)?,
         };
-        Self::at_levels(records, levels_km_h)
+        Ok(Self { is_renumbered, ..Self::at_levels(records, levels_km_h)? })
     }
 
     /// Analyses the plots of a trial whose speeds were measured, each at its own nominal speed.
@@ -119,7 +122,7 @@ impl Analysis {
             }
         }
         let responses = Response::ALL.map(|response| ResponseAnalysis::of(response, &records, &levels_km_h)).to_vec();
-        Ok(Self { records, levels_km_h, responses })
+        Ok(Self { records, levels_km_h, responses, is_renumbered: false })
     }
 
     /// Damaged plants of all plots together.
@@ -173,19 +176,20 @@ impl Treatment {
             (!values.is_empty()).then(|| Mean::of(&values))
         };
         let mean_of = |quantity| mean(quantity).map(|of| of.mean);
+        let damaged = damaged(records.iter().copied());
         Self {
             speed_km_h,
             spacing_cm,
             plots: records.len(),
             mean: Performance {
-                plant_damage_percent: mean_of(|plot| plot.plant_damage_percent),
+                plant_damage_percent: damaged.percent(),
                 weeding_efficiency_percent: mean_of(|plot| plot.weeding_efficiency_percent),
                 theoretical_capacity_ha_h: mean_of(|plot| plot.theoretical_capacity_ha_h),
                 effective_capacity_ha_h: mean_of(|plot| plot.effective_capacity_ha_h),
                 field_efficiency_percent: mean_of(|plot| plot.field_efficiency_percent),
                 performance_index: mean_of(|plot| plot.performance_index),
             },
-            damaged: damaged(records.iter().copied()),
+            damaged,
             weeding_efficiency: mean(|plot| plot.weeding_efficiency_percent),
         }
     }

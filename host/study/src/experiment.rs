@@ -397,16 +397,14 @@ impl PlotOutcome {
         ]
     }
 
-    /// Puts the counts of all rows into the record.
+    /// Puts the counts of all rows into the record. Weeds are those on the counted ground.
     fn record_counts(&mut self) {
-        let Effect { plants, in_plot, counted, .. } = self.effect;
+        let Effect { plants, counted, .. } = self.effect;
         // A plot's record has `u32` counts.
         let in_a_plot = |weeds: u64| u32::try_from(weeds).unwrap_or(u32::MAX);
-        // If no weed stands on the counted ground, the whole plot is counted.
-        let weeds = if counted.before > 0 { counted } else { in_plot };
         self.record = PlotRecord {
-            weeds_before: Some(in_a_plot(weeds.before)),
-            weeds_after: Some(in_a_plot(weeds.after)),
+            weeds_before: Some(in_a_plot(counted.before)),
+            weeds_after: Some(in_a_plot(counted.after)),
             plants: Some(plants),
             damaged: Some(self.effect.injured()),
             ..self.record

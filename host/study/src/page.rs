@@ -10,7 +10,7 @@ mod figure;
 use crate::evaluation::published::{Coefficients, MACHINES};
 use crate::evaluation::{Analysis, Response, ResponseAnalysis};
 use crate::experiment::{Total, Treatment};
-use crate::statistics::{Mean, NoModel};
+use crate::statistics::{NoModel, mean};
 use crate::table::{NOTHING, Table, distinct, fixed, optional, short, significant, visible};
 use anyhow::{Context, Result};
 use askama::Template;
@@ -77,13 +77,11 @@ impl Page<'_> {
         let efficiencies = records.iter().filter_map(|plot| plot.performance().weeding_efficiency_percent);
         let efficiencies: Vec<f64> = efficiencies.collect();
         if !efficiencies.is_empty() {
-            let Mean { mean, within } = Mean::of(&efficiencies);
-            let within = within
-                .map_or_else(String::new, |within| format!("± {} points, two-sided 95 % interval, ", fixed(within, 1)));
+            // Plots of a block or treatment belong together, so the mean of all has no interval by their scatter.
             rows.push(vec![
                 "weeds gone, as counted".to_owned(),
-                format!("{} %", fixed(mean, 1)),
-                format!("{within}mean of {}", counted(efficiencies.len(), "plot")),
+                format!("{} %", fixed(mean(&efficiencies), 1)),
+                format!("mean of {}", counted(efficiencies.len(), "plot")),
             ]);
         }
         for total in self.totals.iter().filter(|total| total.plots.controller == Treatment::Firmware) {
@@ -101,7 +99,7 @@ impl Page<'_> {
         let from = self.parameters.iter().find(|(name, _)| ["field", "plots from"].contains(&name.as_str()));
         if let Some((name, value)) = from {
             let simulated = "simulated; its assumptions are under Repeat it";
-            let basis = if self.totals.is_empty() { "counted by hand" } else { simulated };
+            let basis = if self.totals.is_empty() { "counts and measurements" } else { simulated };
             rows.push(vec![name.clone(), value.clone(), basis.to_owned()]);
         }
         Table { rows, is_prose: true, ..Table::new("Result", ["measure", "value", "interval and basis"]) }

@@ -77,7 +77,7 @@ pub const RESULTS: [&str; 8] = [
 fn results(outcome: &PlotOutcome, rows: u32) -> [f64; RESULTS.len()] {
     let performance = outcome.record.performance();
     // From all weeds: the scatter of a square metre would hide the effect.
-    let weeding = outcome.effect.in_plot.efficiency_percent().or(performance.weeding_efficiency_percent);
+    let weeding = outcome.effect.in_plot.efficiency_percent();
     // A plot without a plant or a weed has no such figure.
     let known = |measure: Option<f64>| measure.unwrap_or(f64::NAN);
     [

@@ -109,7 +109,7 @@ fn assert_sources(analysis: &AnalysisOfVariance, expected: &[Expected], residual
 #[test]
 fn trials_with_lost_plots_are_analysed_as_statsmodels_does() {
     type Case = ([u32; 3], fn(usize, u32, u32, u32) -> bool, &'static [Expected], (usize, f64), &'static [Remark]);
-    let cases: [Case; 6] = [
+    let cases: [Case; 7] = [
         (
             [6, 4, 2],
             |plot, _, _, _| plot == 17,
@@ -180,6 +180,18 @@ fn trials_with_lost_plots_are_analysed_as_statsmodels_does() {
                 ("speed x spacing", 3, 211.20408163265296, 3.2428028671027365, 0.04983127758013918),
             ],
             (16, 347.36054421768705),
+            &[Remark::InseparableBlocks],
+        ),
+        // The slow speeds on days 1 and 3, the fast ones on days 2 and 4.
+        (
+            [4, 4, 2],
+            |_, block, speed, _| (block % 2 == 1) != (speed <= 2),
+            &[
+                ("speed", 3, 66.02551020408168, 1.4395683853384516, 0.3016985777359037),
+                ("spacing", 1, 11.755102040816297, 0.7688970465543115, 0.4061188243245836),
+                ("speed x spacing", 3, 63.50000000000003, 1.3845041437232333, 0.3159880209635325),
+            ],
+            (8, 122.30612244897958),
             &[Remark::InseparableBlocks],
         ),
     ];

@@ -397,10 +397,8 @@ fn a_real_trial_is_evaluated_without_comparison_and_row() {
     let results = cells(&page, "Result");
     // 60 of 24 times 97 plants.
     assert_eq!(results[0][..2], ["plants damaged", "2.6 %"]);
-    assert!(
-        results[0][2].contains("two-sided 95 % interval") && results[1][2].contains("mean of 24 plots"),
-        "{results:?}"
-    );
+    assert!(results[0][2].contains("two-sided 95 % interval") && results[1][2] == "mean of 24 plots", "{results:?}");
+    assert!(html.contains("Over a <em>whole plot</em> it is higher"), "what was counted is not known");
     let (first, _) = html.split_once("<main>").unwrap();
     assert!(first.contains("24 plots of 8 treatments") && !first.contains("Weeding efficiency falls"), "{first}");
 }
@@ -424,6 +422,21 @@ fn a_trial_of_one_plot_has_a_page() {
     let page = parse(&xml);
     assert_eq!(cells(&page, "Each plot: counts, measurements and results").len(), 1);
     assert!(!html.contains("NaN"));
+}
+
+#[test]
+fn a_mean_at_a_nominal_speed_below_the_measured_ones_stays_in_its_chart() {
+    let mut records = trial(true).records;
+    records.retain(|plot| plot.speed_km_h.fract() == 0.0);
+    records.iter_mut().for_each(|plot| plot.speed_km_h *= 1.15);
+    let analysis = Analysis::at_speeds(records, &[1.0, 2.0]).unwrap();
+    let xml = closed(&plain_page("Measured", &[], &analysis));
+    let page = parse(&xml);
+    // Means are large circles, and plotters clamps what is outside the frame. A legend has one at 44.
+    let xs =
+        page.descendants().filter(|node| node.attribute("r") == Some("12")).filter_map(|node| node.attribute("cx"));
+    let left = xs.map(|x| x.parse::<i32>().unwrap()).filter(|x| *x > 44).min().unwrap();
+    assert!(left > 90, "{left}: the frame begins at 90");
 }
 
 #[test]

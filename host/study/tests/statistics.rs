@@ -394,9 +394,21 @@ fn a_bend_an_outlier_and_uneven_scatter_are_each_described() {
         Checks::of(&design, &values, &model).sentences("It", &NUMBERS).join(" ")
     };
     assert!(said(|_, speed| (speed - 1.75).powi(2)).contains("does not follow straight lines"));
-    assert!(said(|plot, speed| speed + if plot == 4 { 3.0 } else { 0.0 }).contains("Plot 5 is farther from the model"));
+    assert!(
+        said(|plot, speed| speed + if plot == 4 { 3.0 } else { 0.0 }).contains("It: plot 5 is farther from the model")
+    );
     let fan = said(|plot, speed| [-1.0, 0.0, 1.0][plot % 3] * (speed - 0.9));
     assert!(fan.contains("scatters more at some speeds"), "{fan}");
+}
+
+#[test]
+fn few_plots_are_not_tested_for_unequal_scatter() {
+    for (plots, is_tested) in [(4, false), (8, false), (9, true)] {
+        let design = Design::new((0..plots).map(|plot| (1.0 + (plot % 2) as f64, 50.0)));
+        let values = &EFFICIENCY[..plots];
+        let checks = Checks::of(&design, values, &LinearModel::fit(&design, values).unwrap());
+        assert_eq!(checks.unequal_scatter_p.is_some(), is_tested, "{plots} plots");
+    }
 }
 
 /// statsmodels 0.15.0: `OLS(y, X).fit().get_influence().resid_studentized_external` is infinite for the damaged plot, and
@@ -410,7 +422,8 @@ fn the_only_plot_with_damage_is_the_outlier_in_every_place() {
         let checks = Checks::of(&design, &values, &LinearModel::fit(&design, &values).unwrap());
         assert_eq!(checks.farthest, Some((vec![place], 0.0)));
         let said = checks.sentences("Plant damage", &NUMBERS);
-        let outlier = format!("Plot {} is farther from the model than chance explains (p < 0.0001)", place + 1);
+        let outlier =
+            format!("Plant damage: plot {} is farther from the model than chance explains (p < 0.0001)", place + 1);
         assert!(said.iter().any(|sentence| sentence.starts_with(&outlier)), "{said:?}");
     }
 }

@@ -185,6 +185,7 @@ fn the_damage_of_a_treatment_is_of_all_its_plants_and_in_its_interval() {
     let analysis = Analysis::of([(1, 6, 1), (2, 600, 0), (3, 600, 0)].map(plot).to_vec()).unwrap();
     let damaged = analysis.treatments()[0].damaged;
     assert_eq!((damaged.count, damaged.of), (1, 1206));
+    assert_eq!(analysis.treatments()[0].mean.plant_damage_percent, damaged.percent(), "the chart shows it");
     assert_close(damaged.least_percent, 0.0020992986927988416);
     assert_close(damaged.greatest_percent, 0.4611189473301202);
     let text = analysis.to_string();
@@ -198,6 +199,10 @@ fn the_damage_of_a_treatment_is_of_all_its_plants_and_in_its_interval() {
 fn more_weeds_after_than_before_are_a_negative_efficiency() {
     let analysis = judged("more-weeds-after.csv");
     assert_close(analysis.records[4].performance().weeding_efficiency_percent.unwrap(), -15.0);
+    let more =
+        |plot: PlotRecord| PlotRecord { weeds_after: plot.weeds_before.map(|before| before + plot.plot), ..plot };
+    let none_gone = Analysis::of(example().into_iter().map(more).collect()).unwrap();
+    assert_eq!(none_gone.responses[1].binomial, Some(Err(NoModel::NothingCounted)));
     let model = analysis.responses[1].model.as_ref().unwrap();
     for (term, (estimate, p)) in model.terms.iter().zip([
         (43.89226839599138, 0.37055806637367183),
@@ -230,6 +235,7 @@ fn a_plot_without_a_count_takes_part_in_what_it_has() {
         &analysis,
         "Plot 5 (no weeds_before and no weeds_after) takes no part in weeding efficiency and performance index.",
     );
+    assert!(analysis.to_string().contains(" (2 plots) "), "{analysis}");
 }
 
 #[test]
@@ -278,7 +284,7 @@ fn of_two_equally_bad_plots_both_are_named() {
         ..PlotRecord::default()
     });
     let analysis = Analysis::of(mirrored.collect()).unwrap();
-    assert_found(&analysis, "Plots 3 and 4 are equally far from the model");
+    assert_found(&analysis, "Plant damage: plots 3 and 4 are equally far from the model");
 }
 
 #[test]

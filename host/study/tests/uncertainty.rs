@@ -74,9 +74,10 @@ fn none_of_many_is_below_three_by_their_number_and_all_of_them_above() {
 /// binom.test(13, 1318)$conf.int[1:2]; binom.test(1, 12735)$conf.int[1:2]; binom.test(1, 1e9)$conf.int[1:2]
 /// binom.test(0, 91, alternative = "less")$conf.int[2]; binom.test(0, 1e9, alternative = "less")$conf.int[2]
 /// binom.test(1e9, 1e9, alternative = "greater")$conf.int[1]
+/// binom.test(16, 30000)$conf.int[1:2]; q(600, 1e6); q(93748e3, 1e8); binom.test(9999, 10000)$conf.int[1:2]
 /// ```
 #[test]
-fn an_interval_is_rounded_outward_and_no_end_above_0_reads_as_0() {
+fn an_interval_is_rounded_outward_with_its_share_inside_and_no_end_above_0_reads_as_0() {
     for (count, of, share, interval) in [
         (13_u64, 1318_u64, "1.0", "0.52 to 1.69"),
         (1, 12_735, "0.0079", "0.00019 to 0.044"),
@@ -84,6 +85,10 @@ fn an_interval_is_rounded_outward_and_no_end_above_0_reads_as_0() {
         (0, 91, "0.0", "below 3.3"),
         (0, 1_000_000_000, "0.0", "below 0.00000030"),
         (1_000_000_000, 1_000_000_000, "100.0", "above 99.99999970"),
+        (16, 30_000, "0.05", "0.030 to 0.09"),
+        (600, 1_000_000, "0.06", "0.055 to 0.065"),
+        (93_748_000, 100_000_000, "93.75", "93.743 to 93.753"),
+        (9999, 10_000, "99.99", "99.94 to 100.00"),
     ] {
         let of_all = Share::of(count, of);
         assert_eq!((of_all.shown().as_str(), of_all.to_string().as_str()), (share, interval));
@@ -94,11 +99,12 @@ fn an_interval_is_rounded_outward_and_no_end_above_0_reads_as_0() {
 /// t.test(c(43.7, 44.1, 42.9))$conf.int[1:2]
 /// ```
 #[test]
-fn the_interval_of_a_mean_is_that_of_r_and_a_single_value_has_none() {
+fn the_interval_of_a_mean_is_that_of_r_and_without_scatter_there_is_none() {
     let mean = Mean::of(&[43.7, 44.1, 42.9]);
     assert_close(mean.mean - mean.within.unwrap(), 42.048833453228);
     assert_close(mean.mean + mean.within.unwrap(), 45.0844998801054);
-    assert_eq!(Mean::of(&[43.7]), Mean { mean: 43.7, within: None });
+    assert_eq!(Mean::of(&[43.7]), Mean { mean: 43.7, within: None, of: 1 });
+    assert_eq!(Mean::of(&[100.0; 3]), Mean { mean: 100.0, within: None, of: 3 });
 }
 
 #[test]
@@ -203,7 +209,7 @@ fn counts_that_carry_no_binomial_model_are_refused_with_a_reason() {
             .map(|((speed, spacing), (_, of))| ((speed, spacing), (count(speed, of), of)))
             .collect()
     };
-    assert_eq!(model(&with(|_, _| 0)), Err(NoModel::Constant { value: 0.0 }));
+    assert_eq!(model(&with(|_, _| 0)), Err(NoModel::NothingCounted));
     assert_eq!(model(&with(|_, of| of)), Err(NoModel::Constant { value: 100.0 }));
     // All plants at the highest speed, and none at any other: the steeper the slope, the better the fit.
     assert_eq!(model(&with(|speed, of| if speed > 2.0 { of } else { 0 })), Err(NoModel::OneSided));

@@ -127,8 +127,8 @@ fn a_log_gives_each_plot_its_speed_and_what_the_table_leaves_empty() {
     let labelled = format!("plot,{HEADER}P1,1,1.8,50,100,12,,0,,,0.4,2.5\nP2,1,3.6,50,100,18,,1,,,0.4,2.5\n");
     fs::write(folder.path().join("trial.csv"), labelled).unwrap();
     assert_refused(folder.path(), &one[..4], "replication 1 of 1.8 km/h and 50 cm has no number of its own");
-    let told = String::from_utf8(weeder(folder.path(), &one[..2]).stderr).unwrap();
-    assert!(told.contains("so plots have the numbers of their lines"), "{told}");
+    let told = String::from_utf8(weeder(folder.path(), &one[..2]).stdout).unwrap();
+    assert!(told.contains("each plot once: plots are numbered in the order of the lines"), "{told}");
 }
 
 #[test]

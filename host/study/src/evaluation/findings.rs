@@ -4,7 +4,7 @@ use super::report::times;
 use super::table::LEAVE_OUT;
 use super::{Analysis, PlotRecord, Response, ResponseAnalysis, Treatment, nominal};
 use crate::statistics::{OddsTerm, SIGNIFICANCE, Share, Term, grouped, probability};
-use crate::table::{distinct, in_words, list, optional, visible};
+use crate::table::{distinct, in_words, list, visible};
 use field::counted;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -12,6 +12,9 @@ impl Analysis {
     /// The findings, a sentence each: the plots, the damage, the effects on each measure, and impossible values.
     pub fn findings(&self) -> Vec<String> {
         let mut findings = vec![self.size(), self.damage_in_words()];
+        findings.extend(self.is_renumbered.then(|| {
+            "The column plot does not number each plot once: plots are numbered in the order of the lines.".to_owned()
+        }));
         for response in &self.responses {
             findings.push(response.finding());
             findings.extend(response.odds());
@@ -109,7 +112,6 @@ impl Analysis {
         }
         let percent = |plot: &PlotRecord| plot.performance().plant_damage_percent;
         let most = self.records.iter().filter_map(percent).fold(0.0, f64::max);
-        let all = optional(share.percent(), |percent| visible(percent, 2));
         let worst = self.records.iter().filter(|plot| percent(plot).is_some_and(|percent| percent >= most));
         let place = |plot: &PlotRecord| {
             format!("replication {}, {} km/h, {} cm", plot.replication, plot.speed_km_h, plot.spacing_cm)
@@ -117,7 +119,8 @@ impl Analysis {
         let worst: Vec<String> = worst.map(place).collect();
         let kind = if worst.len() == 1 { "a plot" } else { "each of these plots" };
         format!(
-            "{count} of {of} plants were damaged: {all} %, {} {share} %. At most {} % in {kind}: {}.",
+            "{count} of {of} plants were damaged: {} %, {} {share} %. At most {} % in {kind}: {}.",
+            share.in_interval(2),
             share.kind(),
             visible(most, 2),
             worst.join("; ")
@@ -138,7 +141,10 @@ impl Analysis {
         };
         let mut said: Vec<String> = compared.iter().filter_map(|of| of.against_the_paper()).collect();
         if said.is_empty() {
-            said.push(format!("No slope by speed differs from the paper's. Compared: {}.", names(&compared)));
+            said.push(format!(
+                "No slope by speed is shown to differ from the paper's: each 95 % interval contains the paper's slope. Compared: {}.",
+                names(&compared)
+            ));
         }
         if !without.is_empty() {
             said.push(format!("Not compared, because this trial has no such slope: {}.", names(&without)));

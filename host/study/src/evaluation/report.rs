@@ -4,8 +4,9 @@
 use super::plot::COLUMNS;
 use super::published::Published;
 use super::{Analysis, Performance, ResponseAnalysis};
-use crate::statistics::{AnalysisOfVariance, BinomialModel, LinearModel};
+use crate::statistics::{AnalysisOfVariance, BinomialModel, LinearModel, Mean};
 use crate::table::{NOTHING, Table, fixed, optional, probability, short, significant, visible};
+use field::counted;
 use std::fmt::{self, Display, Formatter};
 
 /// The meaning of p-values and index.
@@ -17,7 +18,7 @@ Weeding efficiency is of the weeds that were counted: over a whole plot it is hi
 A treatment's damage is of all its plants together. Behind it stands its exact 95 % interval: two-sided where it has two
 ends, one-sided where it reads below or above. It takes plants as independent: where plots scatter by more than counting,
 it is too narrow.
-Behind weeding stands the two-sided 95 % interval of a mean of plots.
+Behind weeding stands the two-sided 95 % interval of a mean of plots. The number of plots follows if it is smaller.
 ";
 
 /// Columns of [`Analysis::plots`] that stand in the trial's own table already.
@@ -83,12 +84,14 @@ impl Analysis {
         let mut table = Table::new("Means of the plots of each treatment", columns);
         for treatment in self.treatments() {
             let name = format!("{} km/h, {} cm", short(treatment.speed_km_h), short(treatment.spacing_cm));
-            let [_, weeding, others @ ..] = measures(&treatment.mean);
+            let [_, mut weeding, others @ ..] = measures(&treatment.mean);
             let damage = format!("{} ({})", treatment.damaged.shown(), treatment.damaged);
-            let weeding = treatment
-                .weeding_efficiency
-                .and_then(|mean| mean.within)
-                .map_or(weeding.clone(), |it| format!("{weeding} ± {}", fixed(it, 2)));
+            if let Some(Mean { within, of, .. }) = treatment.weeding_efficiency {
+                weeding += &within.map_or_else(String::new, |within| format!(" ± {}", fixed(within, 2)));
+                if of < treatment.plots {
+                    weeding += &format!(" ({})", counted(of, "plot"));
+                }
+            }
             let cells = [name, treatment.plots.to_string(), damage, weeding];
             table.rows.push(cells.into_iter().chain(others).collect());
         }

@@ -87,7 +87,7 @@ fn only_slopes_by_speed_that_the_trial_has_are_compared_with_the_paper_s() {
     };
     let speeds = [1.0, 2.0, 3.0, 4.0, 1.0, 2.0, 3.0, 4.0];
     assert_eq!(trial(&[2.0; 8], &[3, 5, 4, 6, 2, 7, 3, 5]), [""; 0]);
-    let none = "No slope by speed differs from the paper's. Compared: ";
+    let none = "No slope by speed is shown to differ from the paper's: each 95 % interval contains the paper's slope. Compared: ";
     let without = "Not compared, because this trial has no such slope: ";
     let said = trial(&speeds, &[10, 23, 34, 48, 12, 22, 37, 47]);
     let without_area = format!("{without}performance index and field efficiency.");

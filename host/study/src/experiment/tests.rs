@@ -261,6 +261,16 @@ fn field_efficiency_falls_with_speed_as_the_paper_s_equation_has_it() {
 }
 
 #[test]
+fn weeds_are_those_on_the_counted_ground_even_if_it_has_none() {
+    let sparse = Experiment { replications: 10, ..experiment(&[1.0], "transplanted") }.of_firmware();
+    let outcomes = run(&sparse.with(&[("weeds.short_per_m2", 1.0), ("weeds.tall_per_m", 0.0), ("plot.rows", 2.0)]));
+    assert!(outcomes.iter().any(|of| of.effect.counted.before == 0 && of.effect.in_plot.before > 0));
+    for PlotOutcome { record, effect, .. } in outcomes {
+        assert_eq!(record.weeds_before.map(u64::from), Some(effect.counted.before));
+    }
+}
+
+#[test]
 fn no_parameter_at_an_end_of_its_range_upsets_a_trial() {
     for parameter in PARAMETERS.iter().filter(|parameter| !["plot.rows", "plot.row_m"].contains(&parameter.name)) {
         for end in [parameter.least, parameter.greatest] {

@@ -56,7 +56,8 @@ pub fn curves(texts: [&str; 3], curves: &[Series], limit: Option<&Series>) -> Re
 pub fn response(analysis: &Analysis, response: Response) -> Result<Figure> {
     let treatments = analysis.treatments();
     let spacings = spacings_cm(analysis);
-    let x = range_of(analysis.records.iter().map(|record| record.speed_km_h), false);
+    let speeds = analysis.records.iter().map(|record| record.speed_km_h);
+    let x = range_of(speeds.chain(analysis.levels_km_h.iter().copied()), false);
     // An offset, so that equal values of different spacings stay visible.
     let step = (x.end - x.start) * 0.02;
     let aside = |index: usize| (index as f64 - (spacings.len() - 1) as f64 / 2.0) * step;

@@ -81,7 +81,7 @@ impl BinomialModel {
         let counts: Vec<Count> = counts.iter().map(|&(count, of)| (count.into(), of.into())).collect();
         let (all, of) = counts.iter().fold((0.0, 0.0), |(all, of), (count, n)| (all + count, of + n));
         if all == 0.0 || all == of {
-            return Err(NoModel::Constant { value: if all == 0.0 { 0.0 } else { 100.0 } });
+            return Err(if all == 0.0 { NoModel::NothingCounted } else { NoModel::Constant { value: 100.0 } });
         }
         let (solution, fitted) = fit(&columns, &counts)?;
         let share = all / of;

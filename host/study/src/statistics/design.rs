@@ -111,6 +111,9 @@ pub enum NoModel {
     /// Speed and spacing go together.
     #[error("speed and spacing change together, so their effects cannot be separated")]
     Inseparable,
+    /// Nothing counts: no plant as damaged, or no weed as gone.
+    #[error("the count is 0 in every plot: speed and spacing explain nothing")]
+    NothingCounted,
     /// A binomial model's slope diverges.
     #[error("all that was counted lies on one side of the speeds or spacings, so the odds have no finite slope")]
     OneSided,
@@ -137,13 +140,13 @@ pub enum Remark {
     NoReplication,
     /// The treatments differ in their number of plots, in the trial or in a block.
     #[error(
-        "the treatments differ in their number of plots, in the trial or in a block: sums of squares are sequential (type I), speed first, then spacing, then both"
+        "the treatments differ in their number of plots, in the trial or in a block: sums of squares are sequential (type I), in the order of the table"
     )]
     Unbalanced,
     /// Too few plots for blocks.
     #[error("the replications are not used as blocks: too few plots would remain to separate effects from chance")]
     NoBlocks,
-    /// Speed or spacing goes with the blocks.
+    /// A part of the effects of speed and spacing goes with the blocks.
     #[error(
         "the replications are not used as blocks: their effects cannot be separated from those of speed and spacing"
     )]

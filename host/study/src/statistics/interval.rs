@@ -7,7 +7,7 @@
 //! of `n` gives "below about `3 / n`". A mean's interval is Student's, as in R's `t.test`, over replications that are
 //! assumed independent.
 
-use super::design::{mean, scatter};
+use super::design::{is_zero, mean, scatter};
 use crate::table::{fixed, optional, visible};
 use serde::Serialize;
 use statrs::distribution::{Beta, ContinuousCDF, Normal, StudentsT};
@@ -54,7 +54,17 @@ impl Share {
 
     /// The share itself as text, percent: `0.5`, a small one as `0.0090`, and a dash if the total is 0.
     pub fn shown(&self) -> String {
-        optional(self.percent(), |percent| visible(percent, 1))
+        self.in_interval(1)
+    }
+
+    /// The same with this many decimal places, or with more if only these keep the text inside the share's interval.
+    pub(crate) fn in_interval(&self, decimals: usize) -> String {
+        let interval = self.least_percent..=self.greatest_percent;
+        let is_inside = |text: &String| text.parse().is_ok_and(|shown: f64| interval.contains(&shown));
+        optional(self.percent(), |percent| {
+            let mut texts = (decimals..MOST_PLACES).map(|places| visible(percent, places));
+            texts.find(is_inside).unwrap_or_else(|| visible(percent, decimals))
+        })
     }
 
     /// What kind of interval it has, in words. If none or all were counted, it has one end.
@@ -80,11 +90,12 @@ impl Share {
     }
 }
 
+/// An `f64` has no more decimal places at 99 %.
+const MOST_PLACES: usize = 14;
+
 /// A percentage as text, rounded to so many decimal places.
 fn rounded(percent: f64, places: f64, round: fn(f64) -> f64) -> String {
-    /// An `f64` has no more at 99 %.
-    const MOST_PLACES: f64 = 14.0;
-    let places = places.min(MOST_PLACES);
+    let places = places.min(MOST_PLACES as f64);
     let scale = 10_f64.powf(places);
     fixed(round(percent * scale) / scale, places as usize)
 }
@@ -133,8 +144,10 @@ impl Display for Share {
 pub struct Mean {
     /// The mean, in the values' unit.
     pub mean: f64,
-    /// Half the width of its interval, in the same unit. `None` for a single value.
+    /// Half the width of its interval, in the same unit. `None` for a single value, and if the values do not scatter.
     pub within: Option<f64>,
+    /// How many values there are.
+    pub of: usize,
 }
 
 impl Mean {
@@ -148,7 +161,8 @@ impl Mean {
         let error = || (scatter(values) / (count - 1.0) / count).sqrt();
         Self {
             mean: mean(values),
-            within: (values.len() > 1).then(quantile).flatten().map(|quantile| quantile * error()),
+            within: (!is_zero(scatter(values), values)).then(quantile).flatten().map(|quantile| quantile * error()),
+            of: values.len(),
         }
     }
 }

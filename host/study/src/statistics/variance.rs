@@ -78,13 +78,12 @@ impl AnalysisOfVariance {
             if has_speed {
                 fits.push(("speed", fit(&[&speeds])?));
             }
-            let mut is_separable = true;
             if has_spacing {
-                let both = fit(&[&speeds, &spacings])?;
-                is_separable = !has_speed || both.parameters > fit(&[&spacings])?.parameters;
-                fits.push(("spacing", both));
+                fits.push(("spacing", fit(&[&speeds, &spacings])?));
             }
-            if !is_separable || fits.windows(2).any(|pair| pair[1].1.parameters == pair[0].1.parameters) {
+            // With fewer parameters, a part of one factor's effect is also a part of another's.
+            let factors = in_blocks.iter().copied().chain([&speeds, &spacings]);
+            if fits[fits.len() - 1].1.parameters < 1 + factors.map(|levels| levels.len() - 1).sum::<usize>() {
                 return Err(NoModel::Inseparable);
             }
             let each = fit(&[&treatments])?;
