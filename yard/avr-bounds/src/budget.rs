@@ -94,7 +94,7 @@ impl Budgets {
     /// Holds bounds against the budgets that there are.
     ///
     /// # Errors
-    /// If there is a budget for a time that has no bound.
+    /// If there is a budget for a time that has no bound, or that the program does not have.
     pub fn hold(&self, bounds: &Bounds) -> Result<Vec<Held>, BoundsError> {
         let mut held = Vec::new();
         let mut hold = |name, proved, budget: Option<u64>, keeps: fn(&u64, &u64) -> bool| {
@@ -111,13 +111,21 @@ impl Budgets {
             let longest = bounds.critical_section.or_refuse("a stretch without interrupts")?;
             hold("critical_section_cycles", longest, self.critical_section_cycles, u64::le);
         }
-        // A main program without a known turn counts as unbounded.
-        let loops = bounds.turn.as_ref().map_or(u64::MAX, |turn| turn.without_bound.len() as u64);
-        hold("loops_without_bound", loops, self.loops_without_bound, u64::le);
-        let turn = bounds.turn.as_ref().and_then(|turn| turn.cycles).unwrap_or(u64::MAX);
-        hold("turn_cycles", turn, self.turn_cycles, u64::le);
-        let rate = bounds.edges.as_ref().map_or(0, |edges| edges.never_lost_per_s);
-        hold("never_lost_per_s", rate, self.never_lost_per_s, u64::ge);
+        let no_turn = "no loop has `wdr`: take turn_cycles and loops_without_bound out of the budgets";
+        let turn = || bounds.turn.as_ref().ok_or_else(|| BoundsError(no_turn.to_owned()));
+        if self.loops_without_bound.is_some() {
+            let loops = turn()?.without_bound.len() as u64;
+            hold("loops_without_bound", loops, self.loops_without_bound, u64::le);
+        }
+        if self.turn_cycles.is_some() {
+            let longest = turn()?.or_refuse("a turn of the main loop, which must have its `wdr` itself,")?;
+            hold("turn_cycles", longest, self.turn_cycles, u64::le);
+        }
+        if self.never_lost_per_s.is_some() {
+            let no_input = "never_lost_per_s needs an input: add its vectors and its port to the budgets, in [input]";
+            let edges = bounds.edges.as_ref().ok_or_else(|| BoundsError(no_input.to_owned()))?;
+            hold("never_lost_per_s", edges.never_lost_per_s, self.never_lost_per_s, u64::ge);
+        }
         Ok(held)
     }
 }

@@ -71,6 +71,17 @@ impl Chip {
         if self.flash_bytes > 0x2_0000 { 3 } else { 2 }
     }
 
+    /// The number of its core, as in avr-gcc's `__AVR_ARCH__` and in the flags of an ELF.
+    pub(crate) fn core(&self) -> u32 {
+        match (self.vector_bytes, self.flash_bytes) {
+            (2, _) if self.has_mul => 4,
+            (2, _) => 25,
+            (_, ..=0x1_0000) => 5,
+            (_, ..=0x2_0000) => 51,
+            _ => 6,
+        }
+    }
+
     /// Cycles from an instruction's end to the vector's first one. Each byte of the return address takes one.
     pub(crate) fn response_cycles(&self) -> u64 {
         2 + self.return_address_bytes() as u64
@@ -124,7 +135,7 @@ mod tests {
                 if chip.gpior.is_empty() { "" } else { "(unsigned)&GPIOR0, (unsigned)&GPIOR1, (unsigned)&GPIOR2," };
             let source = format!(
                 "#include <avr/io.h>\nunsigned t[] = {{ FLASHEND & 0xFFFFUL, FLASHEND >> 15 >> 1, RAMEND, _VECTORS_SIZE, \
-                 (unsigned)&EECR, {gpior} 0xFFFF }};"
+                 (unsigned)&EECR, {gpior} __AVR_ARCH__ }};"
             );
             let file = tempfile::Builder::new().suffix(".c").tempfile().expect("there is room for a file");
             std::fs::write(file.path(), source).expect("it can be written");
@@ -145,7 +156,7 @@ mod tests {
                 chip.eecr.into(),
             ];
             let gpior = chip.gpior.iter().map(|&address| u32::from(address));
-            let table: Vec<u32> = table.into_iter().chain(gpior).chain([0xFFFF]).collect();
+            let table: Vec<u32> = table.into_iter().chain(gpior).chain([chip.core()]).collect();
             assert_eq!(said, table, "{}", chip.name);
         }
     }

@@ -231,7 +231,7 @@ fn of_function(function: &FunctionBounds) -> String {
             }
         }
     }
-    for called in calls {
+    for called in calls.values() {
         let _ = writeln!(text, "  calls {called}");
     }
     text
@@ -240,16 +240,17 @@ fn of_function(function: &FunctionBounds) -> String {
 /// The graph of calls, for Graphviz.
 fn graph(bounds: &Bounds) -> String {
     let mut text = "digraph calls {\n  node [shape=box]\n".to_owned();
-    for FunctionBounds { function, stack_bytes, longest, calls, .. } in &bounds.functions {
+    // An address stands for each, because functions may have the same name.
+    for FunctionBounds { function, address, stack_bytes, longest, calls } in &bounds.functions {
         let cycles = match longest {
             None => "never returns".to_owned(),
             Some(Longest { cycles: Some(cycles), .. }) => format!("{cycles} cycles"),
             Some(_) => "no bound in time".to_owned(),
         };
         let label = format!("{function}\n{stack_bytes} bytes\n{cycles}");
-        let _ = writeln!(text, "  {function:?} [label={label:?}]");
-        for called in calls {
-            let _ = writeln!(text, "  {function:?} -> {called:?}");
+        let _ = writeln!(text, "  \"{address:#06x}\" [label={label:?}]");
+        for called in calls.keys() {
+            let _ = writeln!(text, "  \"{address:#06x}\" -> \"{called:#06x}\"");
         }
     }
     text + "}\n"
@@ -265,7 +266,7 @@ fn differences(old: &Bounds, new: &Bounds) -> String {
     if rows.is_empty() { "No bound changed.\n".to_owned() } else { table(&["bound", "old", "new"], rows) }
 }
 
-/// Every figure by its name.
+/// Every figure by its name. Functions of the same name have numbers, in the order of their addresses.
 fn figures(bounds: &Bounds) -> BTreeMap<String, String> {
     let mut all = BTreeMap::from([
         ("stack, bytes".to_owned(), bounds.stack_bytes.to_string()),
@@ -279,10 +280,13 @@ fn figures(bounds: &Bounds) -> BTreeMap<String, String> {
         all.insert(format!("{name}, response"), or_no_bound(handler.response_cycles));
         all.insert(format!("{name}, stack bytes"), handler.stack_bytes.to_string());
     }
+    let mut same: BTreeMap<&String, u32> = BTreeMap::new();
     for FunctionBounds { function, stack_bytes, longest, .. } in &bounds.functions {
-        all.insert(format!("{function}, stack bytes"), stack_bytes.to_string());
+        let number = same.entry(function).and_modify(|number| *number += 1).or_insert(1);
+        let name = if *number == 1 { function.clone() } else { format!("{function} ({number})") };
+        all.insert(format!("{name}, stack bytes"), stack_bytes.to_string());
         if let Some(longest) = longest {
-            all.insert(format!("{function}, cycles"), or_no_bound(longest.cycles));
+            all.insert(format!("{name}, cycles"), or_no_bound(longest.cycles));
         }
     }
     all

@@ -2,8 +2,9 @@
 //!
 //! A path's length is the sum of its instructions' cycles, with the called functions. For a loop, the longest path of
 //! one turn is found first, from the loop's head back to it. It is multiplied by the loop bound. Inner loops are
-//! calculated before outer loops. A loop bound comes from the source or a table ([`crate::loops`]), or is counted
-//! (`counted`). Without a bound the loop is taken once, and its head is kept in the result. Such a result is no bound.
+//! calculated before outer loops. A loop bound comes from the source. Without one it is the larger of the bound in a
+//! table ([`crate::loops`]) and the counted one (`counted`). Without any bound the loop is taken once, and its head is
+//! kept in the result. Such a result is no bound.
 //!
 //! Paths that never end are left out, such as a loop that waits for the watchdog's reset.
 
@@ -57,7 +58,7 @@ pub(crate) struct Passes {
     pub(crate) stated: BTreeMap<u32, u64>,
     /// By addresses where loops may begin: the bounds of the outermost loop and of each depth within it.
     pub(crate) of_heads: BTreeMap<u32, Vec<u64>>,
-    /// Entries of functions with a single loop, which turns once for each byte of a length, and once more.
+    /// Addresses in functions with a single loop, which turns once for each byte of a length, and once more.
     pub(crate) by_length: BTreeSet<u32>,
 }
 
@@ -106,17 +107,20 @@ pub(crate) struct Stretches {
 }
 
 /// Times routines, each once.
+#[derive(Default)]
 pub(crate) struct Timer {
     passes: Passes,
     /// Additional cycles of an interrupt that ends a sleep.
     wake_up_cycles: u32,
     longest: BTreeMap<*const Routine, Option<Time>>,
     stretches: BTreeMap<(*const Routine, Stretch), Stretches>,
+    /// For functions that are called with a constant length.
+    of_lengths: BTreeMap<(*const Routine, u16), Timer>,
 }
 
 impl Timer {
     pub(crate) fn new(passes: Passes, wake_up_cycles: u32) -> Timer {
-        Timer { passes, wake_up_cycles, longest: BTreeMap::new(), stretches: BTreeMap::new() }
+        Timer { passes, wake_up_cycles, ..Timer::default() }
     }
 
     /// The longest path from a routine's entry to the end of a return; `None` if it never returns.
@@ -169,8 +173,8 @@ impl Timer {
         // The beginnings of stretches: after an instruction outside of stretches, or in a called function.
         let mut begins = Vec::new();
         for node in nodes {
-            for called in node.called() {
-                found.inner = longer(found.inner, self.stretches(called, kind).inner);
+            for (_, length, called) in node.calls() {
+                found.inner = longer(found.inner, self.of_call(called, length).stretches(called, kind).inner);
             }
             // An instruction outside lets interrupts in before and after it.
             let alone = |cycles: u32| (kind == Stretch::Closed && !kind.has(node)).then(|| Time::of(cycles.into()));
@@ -178,7 +182,8 @@ impl Timer {
                 let cycles = edge.cycles + self.waking(node);
                 let is_inside = kind.has(&nodes[edge.to]);
                 if let (Some(called), true) = (&edge.through, is_inside) {
-                    begins.extend(self.stretches(called, kind).last.map(|last| (edge.to, last)));
+                    let last = self.of_call(called, edge.length).stretches(called, kind).last;
+                    begins.extend(last.map(|last| (edge.to, last)));
                 }
                 if edge.through.is_none() && is_inside && !kind.has(node) {
                     begins.push((edge.to, alone(cycles).unwrap_or_default()));
@@ -216,10 +221,13 @@ impl Timer {
             let opening = node.edges.iter().filter(|edge| edge.through.is_none() && !kind.has(&nodes[edge.to]));
             let waking = self.waking(node);
             let mut end = opening.map(|edge| Some(Time::of((edge.cycles + waking).into()))).fold(None, longer);
-            for (cycles, called) in node.calls() {
+            for (cycles, length, called) in node.calls() {
                 // The stretch continues in the called function. It ends at once if interrupts are on there.
-                let is_inside = kind.has(&called.nodes[0]);
-                let first = if is_inside { self.stretches(called, kind).first } else { Some(Time::default()) };
+                let first = if kind.has(&called.nodes[0]) {
+                    self.of_call(called, length).stretches(called, kind).first
+                } else {
+                    Some(Time::default())
+                };
                 end = longer(end, first.map(|first| first.and_cycles(cycles)));
             }
             ending.push(end);
@@ -272,13 +280,8 @@ impl Timer {
         let called = match (&edge.through, count) {
             (_, Count::Own) => return Some(Time::of(edge.cycles.into())),
             (None, _) => Time::default(),
-            (Some(called), Count::Whole) => match edge.length {
-                Some(length) if self.passes.by_length.contains(&called.entry.address) => {
-                    Self::of_length(called, length)?
-                }
-                _ => self.longest(called)?,
-            },
-            (Some(called), Count::Stretch(kind)) => self.stretches(called, kind).through?,
+            (Some(called), Count::Whole) => self.of_call(called, edge.length).longest(called)?,
+            (Some(called), Count::Stretch(kind)) => self.of_call(called, edge.length).stretches(called, kind).through?,
         };
         let mut time = called.and_cycles(edge.cycles);
         if node.waits || time.unbounded.is_empty() && time.cycles > MOST_CYCLES {
@@ -287,11 +290,16 @@ impl Timer {
         Some(time)
     }
 
-    /// The longest path through a function that processes this number of bytes.
-    fn of_length(routine: &Routine, length: u16) -> Option<Time> {
-        let passes = vec![u64::from(length) + 1];
-        let of_heads = routine.nodes.iter().map(|node| (node.place.address, passes.clone())).collect();
-        Timer::new(Passes { of_heads, ..Passes::default() }, 0).longest(routine)
+    /// The timer for a call: another one if the called function turns by a length, and this length is constant.
+    fn of_call(&mut self, called: &Routine, length: Option<u16>) -> &mut Timer {
+        let is_by_length = self.passes.by_length.contains(&called.entry.address);
+        let Some(length) = length.filter(|_| is_by_length) else { return self };
+        let wake_up_cycles = self.wake_up_cycles;
+        self.of_lengths.entry((std::ptr::from_ref(called), length)).or_insert_with(|| {
+            let passes = vec![u64::from(length) + 1];
+            let of_heads = called.nodes.iter().map(|node| (node.place.address, passes.clone())).collect();
+            Timer::new(Passes { of_heads, ..Passes::default() }, wake_up_cycles)
+        })
     }
 
     /// The heads of a routine's own unbounded loops, except loops that it never leaves.
@@ -395,7 +403,8 @@ impl Paths<'_> {
         for &head in &heads {
             let stated = if heads.len() == 1 { self.stated(circle, head) } else { None };
             let counted = || if heads.len() == 1 { counted::turns(&self.routine.nodes, circle, head) } else { None };
-            let stated = stated.or_else(|| self.listed(circle, head)).or_else(counted);
+            // A row of the table never lowers what the loop counts by itself.
+            let stated = stated.or_else(|| self.listed(circle, head).max(counted()));
             passes = passes.zip(stated).and_then(|(passes, stated)| passes.checked_add(stated));
             entered = longer(entered, times[head].clone());
             inside[head] = Some(Time::default());
@@ -437,13 +446,23 @@ impl Paths<'_> {
         let by_depth = self.passes.of_heads.get(&self.address(head))?;
         let around = self.around(head);
         let first = around.iter().rposition(|around| self.has(around, circle))?;
+        let of_jumps = self.of_jumps(head);
         let passes = (first..around.len()).map(|depth| {
-            let passes = by_depth.get(depth).or(by_depth.last())?;
+            let passes = of_jumps.max(*by_depth.get(depth).or(by_depth.last())?);
             let Nested { heads, .. } = around[depth];
             let is_head = depth + 1 == around.len() && heads.contains(&(self.address(head) as usize));
-            Some(if is_head { *passes } else { passes.saturating_mul(heads.len() as u64) })
+            Some(if is_head { passes } else { passes.saturating_mul(heads.len() as u64) })
         });
         passes.reduce(|one, other| Some(one?.saturating_mul(other?)))?
+    }
+
+    /// The bound of a loop in a function that turns by a length, for jumps to it with a constant length; 0 without one.
+    fn of_jumps(&self, head: usize) -> u64 {
+        let nodes = &self.routine.nodes;
+        let is_by_length = |node: &usize| self.passes.by_length.contains(&self.address(*node));
+        let by_length: BTreeSet<usize> = (0..nodes.len()).filter(is_by_length).collect();
+        let jumps = entering(nodes, &by_length).filter(|_| by_length.contains(&head));
+        jumps.filter_map(|edge| Some(u64::from(edge.length?) + 1)).max().unwrap_or_default()
     }
 
     /// The loop bound that a place states, if the place is in no inner loop and every turn passes it. It is valid within

@@ -5,7 +5,7 @@ use crate::error::BoundsError;
 use crate::file;
 use crate::loops;
 use addr2line::Loader;
-use object::read::elf::{ElfFile32, ElfSymbol32, ProgramHeader};
+use object::read::elf::{ElfFile32, ElfSymbol32, FileHeader, ProgramHeader};
 use object::{
     Architecture, LittleEndian, Object, ObjectSection, ObjectSymbol, RelocationFlags, RelocationTarget, SectionKind,
     SymbolKind, elf,
@@ -23,6 +23,9 @@ const EEPROM_END: u32 = 0x82_0000;
 
 /// The section in which avr-gcc names the chip.
 const DEVICE_INFO: &str = ".note.gnu.avr.deviceinfo";
+
+/// The core that a linker writes if it was told none.
+const ANY_CORE: u32 = 2;
 
 /// A function's symbol.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -93,7 +96,7 @@ impl Program {
     /// Reads the ELF at `path`, for the chip named, or the one that the file names.
     ///
     /// # Errors
-    /// If the file cannot be read, is no ELF for AVR, is for no known chip, or holds more than it.
+    /// If the file cannot be read, is no ELF for AVR, is for no known chip or another one, or holds more than the chip.
     pub fn read(path: &Path, chip: Option<&str>) -> Result<Program, BoundsError> {
         let error = |reason: String| BoundsError(format!("{} {reason}", path.display()));
         let not_elf = |reason| error(format!("is not a readable ELF file ({reason})"));
@@ -117,6 +120,11 @@ impl Program {
         })?;
         let unknown = || BoundsError(format!("the chip {name} is not known: the known ones are {chips}"));
         let chip = Chip::named(&name).ok_or_else(unknown)?;
+        let core = file.elf_header().e_flags(LittleEndian).avr_arch().0;
+        if ![0, ANY_CORE, chip.core()].contains(&core) {
+            let (name, own) = (chip.name, chip.core());
+            return Err(error(format!("was made for the core avr{core}, and the {name} has avr{own}: name its chip")));
+        }
 
         let (mut flash, mut variables, mut eeprom) = (Vec::new(), Vec::new(), Vec::new());
         let (mut start, mut code_end) = (u32::MAX, 0);

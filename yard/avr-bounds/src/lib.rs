@@ -169,13 +169,11 @@ pub fn prove(elf: &Program, budgets: &Budgets) -> Result<Bounds, BoundsError> {
 
 /// The stated loop bounds.
 fn passes(code: &Code, budgets: &Budgets) -> Passes {
-    let loops = &budgets.loops;
-    let functions = code.elf.functions.iter();
-    let by_length = functions.filter(|(_, symbol)| loops.get(&symbol.name).is_some_and(|bound| bound.by_length));
-    let by_length = by_length.map(|(address, _)| *address).collect();
     let places = code.routines().flat_map(|routine| &routine.nodes).map(|node| node.place.address);
-    let of_heads =
-        places.filter_map(|place| Some((place, loops.get(code.name_for_facts(place)?)?.passes.clone()))).collect();
+    let bound = |place| Some((place, budgets.loops.get(code.name_for_facts(place)?)?));
+    let bounds: BTreeMap<u32, &LoopBound> = places.filter_map(bound).collect();
+    let by_length = bounds.iter().filter(|(_, bound)| bound.by_length).map(|(place, _)| *place).collect();
+    let of_heads = bounds.into_iter().map(|(place, bound)| (place, bound.passes.clone())).collect();
     Passes { stated: code.elf.records.clone(), of_heads, by_length }
 }
 
@@ -280,7 +278,7 @@ fn functions(code: &Code, timer: &mut Timer) -> Vec<FunctionBounds> {
             address: same[0].entry.address,
             stack_bytes: same.iter().map(|routine| bytes(&routine.deepest)).max().unwrap_or_default(),
             longest: time.map(|time| time.longest(code)),
-            calls: called.map(|called| code.name_of(called.entry)).collect(),
+            calls: called.map(|called| (called.entry.address, code.name_of(called.entry))).collect(),
         }
     };
     functions.map(bounds).collect()

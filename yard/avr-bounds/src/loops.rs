@@ -17,8 +17,10 @@
 //! A source that cannot write assembly, such as a library's, needs a row in a table ([`LoopBound`]). The row names the
 //! function by its path without types. It states the most executions of a loop's head, or of each head if the loop has
 //! several entries. It has one number for the outermost loops, one for the loops within them, and so on. For loops side
-//! by side it states the largest number, because the compiler chooses their order. A record at a loop takes precedence
-//! over the table. For a function whose third argument is a number of bytes, a constant argument is used as its bound.
+//! by side it states the largest number, because the compiler chooses their order. It holds for every function of the
+//! name. A loop that counts more turns by itself keeps its own number (`counted`). A record at a loop takes precedence
+//! over both. For a function whose third argument is a number of bytes, a constant argument is used as its bound. After
+//! a jump to the function, the larger of the constant and the stated number is used.
 //!
 //! The analysis does not prove that a stated number is right. A run in the simulator can disprove it.
 

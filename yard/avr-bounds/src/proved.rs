@@ -1,7 +1,7 @@
 //! The result of a proof: the bounds, and the program that they hold for.
 
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 /// A place in the program.
@@ -108,8 +108,8 @@ pub struct FunctionBounds {
     pub stack_bytes: usize,
     /// Its longest time, from its first instruction to the end of its return; `None` if it never returns.
     pub longest: Option<Longest>,
-    /// The functions that it calls.
-    pub calls: BTreeSet<String>,
+    /// The functions that it calls, by their first addresses.
+    pub calls: BTreeMap<u32, String>,
 }
 
 /// A call or a jump to an address that the program works out.

@@ -78,15 +78,15 @@ impl Node {
         self.instruction.operation == Operation::Wdr || through.any(|called| called.feeds)
     }
 
-    /// The routines that it calls, with the cycles of the call.
-    pub(crate) fn calls(&self) -> impl Iterator<Item = (u32, &Rc<Routine>)> {
-        let returning = self.edges.iter().filter_map(|edge| Some((edge.cycles, edge.through.as_ref()?)));
-        returning.chain(self.ends_in.iter().map(|(cycles, called)| (*cycles, called)))
+    /// The routines that it calls, with the cycles of the call, and [`Edge::length`] if they return.
+    pub(crate) fn calls(&self) -> impl Iterator<Item = (u32, Option<u16>, &Rc<Routine>)> {
+        let returning = self.edges.iter().filter_map(|edge| Some((edge.cycles, edge.length, edge.through.as_ref()?)));
+        returning.chain(self.ends_in.iter().map(|(cycles, called)| (*cycles, None, called)))
     }
 
     /// The routines that it calls.
     pub(crate) fn called(&self) -> impl Iterator<Item = &Rc<Routine>> {
-        self.calls().map(|(_, called)| called)
+        self.calls().map(|(_, _, called)| called)
     }
 }
 

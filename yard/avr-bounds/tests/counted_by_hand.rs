@@ -250,8 +250,14 @@ fn a_chip_with_more_flash_puts_longer_addresses_onto_the_stack() {
         (small.handlers[0].longest.cycles, large.handlers[0].longest.cycles),
         (Some(4 + 3 + 4), Some(5 + 3 + 5))
     );
-    let error = Program::read(assembled(program).path(), Some("atmega4")).expect_err("there is none").to_string();
+    let refused = |chip| Program::read(assembled(program).path(), Some(chip)).expect_err("it is another").to_string();
+    let error = refused("atmega4");
     assert!(error.contains("atmega328p"), "{error}");
+    // Chips with other vectors, and with other return addresses.
+    for (chip, core) in [("atmega88", "avr4"), ("atmega2560", "avr6")] {
+        let error = refused(chip);
+        assert!(error.contains("was made for the core avr5") && error.contains(core), "{error}");
+    }
 }
 
 #[test]

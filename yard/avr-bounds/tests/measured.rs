@@ -5,8 +5,12 @@
 //! may exceed its proved bound: stack, handlers, stretches without interrupts. This test writes the table in README.md
 //! when `UPDATE_EXPECT=1` is set.
 
+#[expect(dead_code, reason = "its proofs are the other tests'")]
+mod assembled;
 mod programs;
 
+use assembled::assembled;
+use avr_bounds::command::{Options, report};
 use avr_bounds::{Bounds, Budgets, Program, prove};
 use programs::{Sample, samples};
 use rand::{Rng, RngExt, SeedableRng};
@@ -348,6 +352,24 @@ fn faults(program: &Program, bounds: &Bounds) -> Vec<(&'static str, Vec<usize>)>
 }
 
 #[test]
+fn functions_of_one_name_have_a_box_and_a_figure_each() {
+    // `a::step::<u8>` and `a::step::<u16>`.
+    let program = |more: &str| {
+        let callers = "start:\n rcall _RINvC1a4stephE\n rcall _RINvC1a4steptE\n rjmp start\n";
+        assembled(&format!("{callers}_RINvC1a4stephE:\n {more} ret\n_RINvC1a4steptE:\n push r2\n pop r2\n ret"))
+    };
+    let (old, new) = (program(""), program("nop\n"));
+    let text = |options: Options| {
+        let options = Options { chip: Some("atmega328p".to_owned()), ..options };
+        report(new.path(), &options).expect("it has bounds").text
+    };
+    let changed = text(Options { diff: Some(old.path().to_owned()), ..Options::default() });
+    assert!(changed.contains("a::step, cycles") && !changed.contains("a::step (2)"), "{changed}");
+    let graph = text(Options { dot: true, ..Options::default() });
+    assert_eq!(graph.matches(" -> ").count(), 2, "{graph}");
+}
+
+#[test]
 fn avr_bounds_prints_its_report_in_every_form() {
     let samples = samples();
     let sample = samples.iter().find(|sample| sample.name == "uno/eeprom_write").expect("it is built");
@@ -363,7 +385,7 @@ fn avr_bounds_prints_its_report_in_every_form() {
     let (code, text) = run(&["--json"]);
     assert!(code == Some(0) && text.contains("\"stack_bytes\""), "{text}");
     let (code, text) = run(&["--dot"]);
-    assert!(code == Some(0) && text.starts_with("digraph calls {") && text.contains("\"main\" -> "), "{text}");
+    assert!(code == Some(0) && text.starts_with("digraph calls {") && text.contains("label=\"main\\n"), "{text}");
     assert_eq!(run(&["--diff", elf.to_str().expect("it is text")]), (Some(0), "No bound changed.\n".to_owned()));
     let (code, text) = run(&["--function", "main"]);
     assert!(code == Some(0) && text.starts_with("main, at 0x") && text.contains("it never returns"), "{text}");

@@ -208,23 +208,32 @@ fn a_bound_of_a_function_holds_for_each_of_its_loops_unless_a_record_is_at_one()
     assert_eq!(cycles(nested, &[9]), Some(11 + 9 * (1 + 29 + 3) + (1 + 29 + 2)));
     // The same, with another number for the loop within: three of its turns with their way out.
     assert_eq!(cycles(nested, &[9, 3]), Some(11 + 9 * (1 + 11 + 3) + (1 + 11 + 2)));
+    // Eight turns are counted, whatever a smaller number says; the last one's way out is 1 shorter.
+    assert_eq!(cycles("3: dec r24\n brne 3b\n", &[5]), Some(11 + 8 * 3 - 1));
 }
 
 #[test]
 fn a_function_that_goes_over_as_many_bytes_as_its_caller_says_does_so_where_that_is_a_constant() {
-    let cycles = |length: &str| {
+    let cycles_of = |length: &str, function: &str| {
         let program = format!(
-            "start:\n clr r1\n1: wdr\n {length}\n rcall fills\n rjmp 1b\n\
+            "start:\n clr r1\n sei\n1: wdr\n cli\n {length}\n rcall {function}\n sei\n rjmp 1b\n\
+             jumps:\n sbrc r2, 0\n rjmp 4f\n ldi r20, 44\n ldi r21, 1\n rjmp fills\n4: ldi r20, 7\n ldi r21, 0\n rjmp fills\n\
              fills:\n rjmp 3f\n2: st X+, r22\n3: subi r20, 1\n sbci r21, 0\n brcc 2b\n ret"
         );
         let bound = LoopBound { passes: vec![100], by_length: true, because: "a byte a turn".into() };
         let bounds = try_to_prove_with(&program, None, &[("fills".into(), bound)].into()).expect("it has bounds");
-        bounds.turn.expect("the watchdog is fed").cycles.expect("every loop has a bound")
+        let turn = bounds.turn.expect("the watchdog is fed").cycles.expect("every loop has a bound");
+        // All but wdr 1, cli 1, rjmp 2.
+        assert_eq!(bounds.critical_section.cycles, Some(turn - 4), "{length}");
+        turn
     };
+    let cycles = |length: &str| cycles_of(length, "fills");
     // A byte more is a turn more: st 2, subi 1, sbci 1, brcc 2.
     assert_eq!(cycles("ldi r20, 8\n ldi r21, 0") - cycles("ldi r20, 7\n ldi r21, 0"), 6);
     assert_eq!(cycles("ldi r20, 99\n ldi r21, 0"), cycles("mov r20, r2\n ldi r21, 0"), "the number of the table");
     assert!(cycles("ldi r20, 0\n ldi r21, 1") > cycles("ldi r20, 255\n ldi r21, 0"));
+    // After jumps with constants the largest counts: sbrc 1, rjmp 2, two ldi, rjmp 2 instead of the caller's two ldi.
+    assert_eq!(cycles_of("", "jumps"), cycles("ldi r20, 44\n ldi r21, 1") + 5);
 }
 
 #[test]
@@ -280,6 +289,20 @@ fn a_bound_over_its_budget_and_a_rate_under_it_are_reported() {
     assert_eq!(over(budgets(2, rate + 1)), ["stack_bytes", "never_lost_per_s"]);
     let error = Budgets::read("no-such.toml".as_ref()).expect_err("there is none").to_string();
     assert!(error.starts_with("no-such.toml cannot be read: "), "{error}");
+}
+
+#[test]
+fn a_budget_for_a_time_that_the_program_does_not_have_is_refused() {
+    let refused = |budgets: &str, program: &str, words: &str| {
+        let budgets: Budgets = toml::from_str(budgets).expect("it is whole");
+        let error = budgets.hold(&proved(program)).expect_err("it has no such time").to_string();
+        assert!(error.contains(words), "{error}");
+    };
+    refused("turn_cycles = 9", "start:\n rjmp start", "no loop has `wdr`");
+    refused("loops_without_bound = 0", "start:\n rjmp start", "no loop has `wdr`");
+    refused("never_lost_per_s = 5", "start:\n rjmp start", "in [input]");
+    let unbounded = "start:\n1: wdr\n2: dec r24\n brne 2b\n rjmp 1b";
+    refused("turn_cycles = 9", unbounded, "which must have its `wdr` itself, has a loop without a bound");
 }
 
 #[test]

@@ -60,8 +60,14 @@ const SRAM_BYTES: usize = 2048;
 /// expects zeros, and shows how deep the stack has been.
 const SRAM_AT_POWER_UP: u8 = 0xC5;
 
-/// The register of a reset's cause, by its address in the data space (data sheet, register summary).
+/// The register of a reset's cause, and the watchdog's, by their addresses in the data space (data sheet, register
+/// summary).
 const MCUSR: u16 = 0x54;
+const WDTCSR: u16 = 0x60;
+
+/// WDTCSR's bits: a timeout resets the chip, and a timeout asks for an interrupt first.
+const WDE: u8 = 1 << 3;
+const WDIE: u8 = 1 << 6;
 
 /// The instruction `wdr`, which feeds the watchdog.
 const WDR: u16 = 0x95A8;
@@ -247,7 +253,7 @@ impl Core {
             let until_next_timer = simavr::avr_cycle_timer_process(avr);
             match (*avr).state as u32 {
                 simavr::cpu_Running => self.add_wake_up(),
-                simavr::cpu_Sleeping if (*avr).sreg[simavr::S_I as usize] == 0 => {
+                simavr::cpu_Sleeping if (*avr).sreg[simavr::S_I as usize] == 0 && !self.watchdog_resets() => {
                     return Err(UnoError::Halted { cycle: (*avr).cycle, program_counter: (*avr).pc });
                 }
                 simavr::cpu_Sleeping => {
@@ -268,6 +274,11 @@ impl Core {
             self.recorder_mut().log.interrupts.interrupts_enabled(enabled, cycle);
         }
         Ok(())
+    }
+
+    /// Whether the watchdog resets the chip when it runs out.
+    fn watchdog_resets(&self) -> bool {
+        self.chip.read(WDTCSR) & (WDE | WDIE) == WDE
     }
 
     /// Halts the core for a moment after a wake-up, by a pin between two steps or by a peripheral in the last step.
@@ -293,6 +304,7 @@ impl Core {
     pub(super) fn tear_eeprom(&mut self) {
         let mut content = self.eeprom();
         self.copy_eeprom(b"eesp", &mut content);
+        self.recorder_mut().eeprom.stop();
     }
 
     /// The first word of the next instruction.
@@ -322,16 +334,25 @@ impl Core {
         *self = fresh;
     }
 
-    /// Corrects simavr after a reset: it sets its clock to 0 and forgets the inputs' levels.
+    /// Corrects simavr after a reset: it sets its clock to 0, keeps its ports' values, and forgets the
+    /// inputs' levels.
     fn finish_reset(&mut self, cause: ResetCause) {
         let Some(cycle) = self.recorder_mut().reset_at.take() else {
             return;
         };
         self.asleep = false;
         self.stalled_at = None;
-        // SAFETY: as in `program_counter`. The watchdog's timer, the only one that can run now, was set from this cycle.
+        // SAFETY: as in `step`. The watchdog's timer, the only one that can run now, was set from this cycle.
         unsafe {
             (*self.chip.avr()).cycle = cycle;
+            eeprom::go_on(self.chip, &raw mut (*self.recorder.as_ptr()).eeprom);
+            // A port reports no value that it had before the reset, although its registers are 0 now.
+            for (name, _) in PORTS {
+                let lines = (*Port::peripheral(self.chip, name)).io.irq;
+                for line in [simavr::IOPORT_IRQ_REG_PORT, simavr::IOPORT_IRQ_DIRECTION_ALL] {
+                    (*lines.add(line as usize)).value = 0;
+                }
+            }
         }
         timer::stop_all(self.chip, &self.recorder().timer);
         self.recorder_mut().restart(cycle, cause);

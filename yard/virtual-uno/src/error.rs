@@ -28,7 +28,7 @@ pub enum UnoError {
         /// The address in bytes.
         program_counter: u32,
     },
-    /// The firmware sleeps with interrupts off, so that nothing but a reset can wake it.
+    /// The firmware sleeps with interrupts off, and the watchdog does not reset it. Only a reset from outside can.
     #[error(
         "the firmware halted at cycle {cycle}, address {program_counter:#06x} of flash: it sleeps with interrupts off"
     )]

@@ -277,6 +277,9 @@ fn a_watchdog_reset_is_reported_and_the_firmware_goes_on() {
     assert_eq!(reset.cause, ResetCause::Watchdog);
     let waited = reset.cycle - asked_at;
     assert!((16 * MILLISECOND..17 * MILLISECOND).contains(&waited), "{waited} cycles");
+    // It also resets a firmware that sleeps with interrupts off.
+    uno.send(b"wh");
+    assert_eq!(uno.run_until_serial("\n", 30 * MILLISECOND).unwrap(), format!("{WATCHDOG}2H\n"));
 }
 
 #[test]

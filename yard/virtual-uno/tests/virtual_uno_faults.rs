@@ -148,7 +148,7 @@ fn power_that_goes_during_a_write_leaves_the_byte_undefined() {
         uno.run_until(begin + after).unwrap();
         uno.set(Pin::D4, true);
         fault(&mut uno);
-        uno.run_for_ms(1).unwrap();
+        uno.run_for_ms(4).unwrap();
         uno.eeprom()[9]
     };
     for fault in [Uno::power_cycle, Uno::brown_out] {
@@ -157,4 +157,23 @@ fn power_that_goes_during_a_write_leaves_the_byte_undefined() {
         assert_eq!(left(WRITE_CYCLES + 100, fault), 0x2A);
     }
     assert_eq!(left(WRITE_CYCLES / 4, Uno::reset), 0x2A, "a reset lets the write finish");
+    let reset_and_failure = |uno: &mut Uno| {
+        uno.reset();
+        uno.power_cycle();
+    };
+    assert_eq!(left(WRITE_CYCLES / 4, reset_and_failure), 0xFF, "it was still being erased");
+}
+
+#[test]
+fn a_write_to_the_eeprom_goes_on_over_a_reset() {
+    let mut uno = running();
+    let begin = order_write(&mut uno);
+    uno.run_until(begin + WRITE_CYCLES / 4).unwrap();
+    uno.reset();
+    uno.run_for_ms(5).unwrap();
+    // The program orders the byte again, too early, and waits for the end of the write.
+    let end = uno.changes().last().unwrap();
+    assert!(!end.high && (end.cycle - begin).abs_diff(WRITE_CYCLES) < 60, "{} cycles", end.cycle - begin);
+    assert_eq!(uno.eeprom()[9..11], [0x2A, 0xFF]);
+    assert_eq!(uno.read("read_meanwhile"), Some(&[0x77][..]));
 }

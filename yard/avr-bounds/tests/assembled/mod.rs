@@ -29,7 +29,7 @@ pub fn assembled(program: &str) -> tempfile::NamedTempFile {
     assembled_for(program, false)
 }
 
-/// The same, with the vectors of an ATmega2560 if `is_large` is set.
+/// The same, for the ATmega2560 if `is_large` is set.
 pub fn assembled_for(program: &str, is_large: bool) -> tempfile::NamedTempFile {
     let used = |label: &str| if program.contains(&format!("{label}:")) { label.to_owned() } else { "0".to_owned() };
     let vectors: String = (0..57)
@@ -48,7 +48,8 @@ pub fn assembled_for(program: &str, is_large: bool) -> tempfile::NamedTempFile {
         .collect();
     let elf = tempfile::NamedTempFile::new().expect("there is room for a file");
     let mut gcc = Command::new("avr-gcc")
-        .args(["-mmcu=atmega328p", "-nostdlib", "-x", "assembler", "-", "-o"])
+        .arg(if is_large { "-mmcu=atmega2560" } else { "-mmcu=atmega328p" })
+        .args(["-nostdlib", "-x", "assembler", "-", "-o"])
         .arg(elf.path())
         .stdin(Stdio::piped())
         .spawn()

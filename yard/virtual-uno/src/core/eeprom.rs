@@ -1,8 +1,8 @@
 //! The EEPROM's write time: a byte takes 3.4 ms to write, and a power failure meanwhile leaves it undefined.
 //!
 //! simavr stores a byte at once. Its writer of EECR is replaced by one that lets simavr store the byte, and then keeps
-//! EEPE set for as long as the chip does (data sheet, 8.4.2). Until then EECR accepts no other command. A reset lets
-//! the pending write finish (8.4.3). [`Eeprom::tear`] has the result of a power failure.
+//! EEPE set for as long as the chip does (data sheet, 8.4.2). Until then EECR accepts no other command. The pending
+//! write goes on over a reset (8.4.3). [`Eeprom::tear`] has the result of a power failure.
 //!
 //! Only writes that erase first are timed (EEPM 00). The core is not halted for the few cycles after a command.
 
@@ -54,9 +54,24 @@ impl Eeprom {
         }
     }
 
-    /// Applies a reset: the pending write finishes, and EECR is as at power-up.
-    pub(super) fn reset(&mut self) {
+    /// Ends the pending write, as a power failure does.
+    pub(super) fn stop(&mut self) {
         self.write = None;
+    }
+}
+
+/// Lets the pending write go on after a reset: simavr's reset has cleared EEPE and the time of its end.
+///
+/// # Safety
+/// `eeprom` must be the chip's, and neither may be borrowed.
+pub(super) unsafe fn go_on(chip: Chip, eeprom: *mut Eeprom) {
+    // SAFETY: the caller vouches for `eeprom`, which lives as long as the chip.
+    unsafe {
+        if let Some(Write { begun, .. }) = (*eeprom).write {
+            chip.set(EECR, EEPE);
+            let rest = (begun + WRITE_CYCLES).saturating_sub(chip.cycle());
+            simavr::avr_cycle_timer_register(chip.avr(), rest, Some(on_written), eeprom.cast());
+        }
     }
 }
 

@@ -118,7 +118,6 @@ impl Recorder {
         for pin in Pin::ALL {
             self.record_level(pin, false, cycle);
         }
-        self.eeprom.reset();
         self.timer.reset();
         self.log.interrupts.reset();
         self.log.turns.reset();
