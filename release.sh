@@ -24,6 +24,8 @@
 # `weeder` contains the names of its folders, and the system's libraries. FOLDER must not exist; it appears when the release is
 # complete.
 set -euo pipefail
+# Names are sorted, and letters change their case, alike on each machine.
+export LC_ALL=C
 
 if [ $# -ne 1 ] && [ $# -ne 2 ]; then
     echo "release.sh: name the new folder, as in \`./release.sh weeder-release\`, and a system if it is another than this one." >&2
@@ -50,8 +52,10 @@ release=$(cd "$(dirname "$1")" && pwd)/$(basename "$1")
 cd "$(dirname "$0")"
 folder=$(mktemp -d "$release.XXXXXX")
 trap 'rm -rf "$folder"' EXIT
-chmod 755 "$folder"
+# As in setup.sh.
 target=$(realpath -m "${CARGO_TARGET_DIR:-target}")
+export CARGO_TARGET_DIR=$target
+unset RUSTFLAGS CARGO_ENCODED_RUSTFLAGS CARGO_BUILD_TARGET CARGO_INCREMENTAL
 
 # The host tools for another system. simavr's makefile and its Rust binding know only this computer, so their settings come from the
 # environment. simavr's reader of ELF files is left out, because the virtual Uno has its own: the libraries that it needs are empty.
@@ -60,7 +64,7 @@ build_for_another() {
     rm -rf "$empty"
     mkdir -p "$empty"
     for name in libelf zlib libzstd; do
-        printf 'Name: %s\nDescription: empty\nVersion: 0\nLibs: -L%s\n' "$name" "$empty" >"$empty/$name.pc"
+        printf 'Name: %s\nDescription: empty\nVersion: 0\nLibs: -L"%s"\n' "$name" "$empty" >"$empty/$name.pc"
     done
     for library in elf z; do "$gnu-ar" rcs "$empty/lib$library.a"; done
     local linker=CARGO_TARGET_${system^^}_LINKER libraries=''
@@ -150,7 +154,7 @@ sed -e '/^#/d' -e 's|^firmware = .*|firmware = "../weeder.hex"|' -e 's|^elf = .*
 mkdir "$folder/manual"
 cp -r README.md CHANGELOG.md CONTRIBUTING.md CITATION.cff LICENSE-MIT LICENSE-APACHE docs "$folder/manual/"
 cp --parents yard/avr-bounds/README.md "$folder/manual/"
-grep -oh '](\.\./[^)#]*' docs/*.md | sed 's|^](\.\./||' | LC_ALL=C sort -u | xargs cp --parents --target-directory="$folder/manual"
+grep -oh '](\.\./[^)#]*' docs/*.md | sed 's|^](\.\./||' | sort -u | xargs cp --parents --target-directory="$folder/manual"
 cargo install --quiet --locked mdbook --version 0.5.4 --no-default-features --features search --root "$target/mdbook"
 "$target/mdbook/bin/mdbook" build --dest-dir "$folder/book"
 # mdBook has made .html of the linked .md, which are outside of the book.
@@ -188,14 +192,14 @@ sources=(
 for source in "${sources[@]}"; do
     read -ra options <<<"${source#*|}"
     printf '%s:\n\n' "${source%%|*}"
-    crates "${options[@]}" | LC_ALL=C sort -u | sed 's/^/    /'
+    crates "${options[@]}" | sort -u | sed 's/^/    /'
     [ "${source%%|*}" != page ] || node --print 'const { name, version, license } = require("./page/node_modules/avr8js/package.json"); `    ${name} ${version} ${license}`'
     echo
 done >>"$list"
 for source in "${sources[@]}"; do
     read -ra options <<<"${source#*|}"
     crates "${options[@]}"
-done | LC_ALL=C sort -u | while read -r name version _; do
+done | sort -u | while read -r name version _; do
     for crate in "${CARGO_HOME:-$HOME/.cargo}"/registry/src/*/"$name-$version"; do
         find "$crate" -maxdepth 3 -type f \( -iname 'LICEN[CS]E*' -o -iname 'COPYING*' -o -iname 'UNLICENSE*' \) |
             while read -r text; do
@@ -236,7 +240,9 @@ sbom page host/page -- --target wasm32-unknown-unknown
 (cd page && npx --yes npm@10.9.4 sbom --sbom-format cyclonedx --omit dev) >"$target/npm-sbom.json"
 node .ci/sbom.mjs "$target/npm-sbom.json" "$folder/sbom/page-npm.json"
 
-(cd "$folder" && find . -type f ! -name SHA256SUMS -printf '%P\0' | LC_ALL=C sort -z | xargs -0 sha256sum >SHA256SUMS)
+(cd "$folder" && find . -type f ! -name SHA256SUMS -printf '%P\0' | sort -z | xargs -0 sha256sum >SHA256SUMS)
+# Every user may read it, under any umask.
+chmod -R u=rwX,go=rX "$folder"
 mv -T "$folder" "$release"
 trap - EXIT
 echo "The release is in $release."

@@ -99,14 +99,19 @@ fi
 if [ "$page" = yes ]; then
     if ! node --eval 'const [major, minor] = process.versions.node.split(".").map(Number); process.exit(major > 18 || (major === 18 && minor >= 19) ? 0 : 1)'; then
         echo "setup.sh: the page needs Node.js 18.19 or later, and this is $(node --version || echo none)." >&2
+        echo "Install a newer one from https://nodejs.org, then run this again." >&2
         exit 1
     fi
     echo "Node.js: $(node --version)."
     lock=page/node_modules/.package-lock.json
     if [ ! -e "$lock" ] || [ page/package-lock.json -nt "$lock" ]; then npm --prefix page ci --no-audit --no-fund; fi
+    # All builds go into one folder, also if the user's cargo has another. These variables would replace this repository's flags.
+    CARGO_TARGET_DIR=$(realpath -m "${CARGO_TARGET_DIR:-target}")
+    export CARGO_TARGET_DIR
+    unset RUSTFLAGS CARGO_ENCODED_RUSTFLAGS CARGO_BUILD_TARGET CARGO_INCREMENTAL
     cargo firmware --quiet
     cargo build --release --quiet --package weeder-cli
-    WEEDER=$(realpath "${CARGO_TARGET_DIR:-target}")/release/weeder npm --prefix page run --silent build
+    WEEDER=$CARGO_TARGET_DIR/release/weeder npm --prefix page run --silent build
     echo "See it in your browser: cargo serve"
 fi
 

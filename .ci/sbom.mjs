@@ -6,7 +6,8 @@
 import { readFileSync, writeFileSync } from "node:fs";
 
 const [from, to, ...packages] = process.argv.slice(2);
-const sbom = JSON.parse(readFileSync(from, "utf8").replaceAll(process.cwd(), "/weeder"));
+const here = process.cwd();
+const sbom = JSON.parse(readFileSync(from, "utf8").replaceAll(encodeURI(here), "/weeder").replaceAll(here, "/weeder"));
 delete sbom.serialNumber;
 delete sbom.metadata.timestamp;
 if (sbom.bomFormat !== "CycloneDX" || !sbom.components?.length) {

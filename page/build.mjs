@@ -18,7 +18,9 @@ import { build, transform } from "esbuild";
 const here = fileURLToPath(new URL(".", import.meta.url));
 process.chdir(here);
 
-const target = process.env.CARGO_TARGET_DIR ?? "../target";
+const metadata = execFileSync("cargo", ["metadata", "--no-deps", "--format-version", "1"], { encoding: "utf8" });
+/** Cargo's folder, as variables and the user's configuration of cargo name it. */
+const target = JSON.parse(metadata).target_directory;
 mkdirSync("build", { recursive: true });
 
 /** The firmware as a HEX file. `weeder hex` refuses a firmware with unproved bounds. */

@@ -224,12 +224,12 @@ test("a byte that reads back wrong is told", async () => {
 test("a port that cannot be opened is told with both causes, as the browser tells neither", async () => {
     const refuses = { name: "NetworkError", message: "Failed to open serial port." };
     const text = await said(new Foreign(() => [], "", refuses));
-    assert.match(text, /another tab or another program has it: close the other tab first.*usermod -aG dialout/);
+    assert.match(text, /tab or another program has it: close the other tab first.*usermod -aG dialout.*snap connect/);
 });
 
 test("where no port is chosen, the way to one is told", async () => {
     const opened = await open(browser, "flash", undefined, []);
-    assert.match(await flash(opened.page), /No port was chosen.*a cable that carries data/);
+    assert.match(await flash(opened.page), /No port was chosen.*a cable that carries data.*snap connect chromium/);
     await close(opened);
 });
 

@@ -20,7 +20,7 @@ also where Ctrl-C ends the check.
 
   weeder flash --tester --port /dev/ttyACM1
   weeder check-board --page check.html
-  weeder check-board --port /dev/ttyACM0 --tester /dev/ttyACM1 --json --board 'Uno R3' > uno-r3.json
+  weeder check-board --port /dev/ttyACM0 --tester /dev/ttyACM1 --json --board \"Uno R3\" > uno-r3.json
   weeder check-board --simulated --brief
 
 Status 1: a wire is wrong, or a figure is outside its limits.")]

@@ -63,7 +63,7 @@ Example: weeder examples push chilli.csv --replace")]
     },
     /// List the examples that only the table or only the machine has; the status is 1 if there is one, or an invalid
     /// one.
-    #[command(after_help = "Example: weeder examples diff chilli.csv && echo the same")]
+    #[command(after_help = "Example: weeder examples diff chilli.csv")]
     Diff {
         /// The table; - for standard input.
         #[arg(value_name = "FILE.csv", value_parser = source::file())]

@@ -16,7 +16,6 @@ use std::path::{self, Path};
 use std::process::Command;
 use uno::bootloader::check_room;
 use uno::elf::Image;
-use uno::hex;
 use uno_run::firmware;
 
 #[derive(Args)]
@@ -32,7 +31,8 @@ pub struct Arguments {
     /// Use the bootloader before optiboot, at 57600 baud: the Duemilanove's, and that of many Nano copies.
     #[arg(long)]
     old_bootloader: bool,
-    /// Use ravedude (Ravedude.toml) if it is installed and the bootloader is not the old one.
+    /// Use ravedude (Ravedude.toml) if it is installed and the bootloader is not the old one. If you interrupt ravedude,
+    /// half a firmware may run.
     #[arg(long)]
     ravedude: bool,
     #[command(flatten)]
@@ -84,13 +84,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     } else if arguments.ravedude && run_ravedude(&elf, &port)? {
         return Ok(());
     }
-    // Files beside the ELF belong to the user.
-    let folder = tempfile::tempdir().context("there is no room for a temporary file")?;
-    let image = folder.path().join("weeder.hex");
-    std::fs::write(&image, hex::text(&flash)).context("there is no room for a temporary file")?;
-    let (succeeded, signature) = avrdude::write(&image, &port, bootloader.baud)?;
+    let (succeeded, signature) = avrdude::write(&flash, &port, bootloader.baud)?;
     ensure!(succeeded, "avrdude did not succeed: {}", why(&claim, &port, bootloader, other, signature));
-    say!("Done: the Uno runs it. `weeder monitor --port {port}` talks to it.")
+    say!("Done: the Uno runs it. `weeder monitor --port {}` talks to it.", shlex::try_quote(&port)?)
 }
 
 /// Seconds from the reset until the firmware starts: the bytes go to the Uno and back, a page takes 5 ms to write, and
@@ -111,8 +107,10 @@ fn why(claim: &Claim, port: &str, bootloader: Bootloader, other: Bootloader, nam
             Err(error) => return error.to_string(),
             Ok(Heard::Bootloader(signature)) if signature != ATMEGA328P => return other_chip(signature),
             Ok(Heard::Bootloader(_)) if answers.baud == bootloader.baud => {
-                return "the bootloader answers now: flash it again. If it fails again, pull D0 and D1 free of other \
-                        devices, and take another cable"
+                return "the bootloader answers, so avrdude's own message above says why. If avrdude cannot open a \
+                        file: on Windows, avrdude.conf belongs beside avrdude.exe. Otherwise flash it again: half a \
+                        firmware does not run. If it fails again, pull D0 and D1 free of other devices, and take \
+                        another cable"
                     .to_owned();
             }
             Ok(Heard::Bootloader(_)) => {

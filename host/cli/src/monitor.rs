@@ -47,6 +47,10 @@ pub struct Arguments {
 /// Parses a typed line: the row before a colon, or `all`, and the command. Without a row it goes to `chosen`. `None` is
 /// all rows. Fails if there is no such row, or the rest is no command; in words.
 fn addressed<'a>(line: &'a str, names: &[String], chosen: Option<usize>) -> Result<(Option<usize>, &'a str), String> {
+    // A colon behind `hold` is punctuation, not the end of a row's name.
+    if link::is_hold(line) {
+        return Ok((chosen, HOLD));
+    }
     let row = |name: &str| if name.eq_ignore_ascii_case(ALL) { Ok(None) } else { find(name, names).map(Some) };
     let (to, command) = match line.split_once(':').map(|(name, command)| (row(name.trim()), command.trim())) {
         Some((Ok(to), command)) => (to, command),

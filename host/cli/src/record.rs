@@ -26,7 +26,7 @@ It continues after a pulled cable, and records the other rows meanwhile.\n\
 Opening the port resets most Unos: start before you work.\n\
 With a satellite receiver, `weeder map` draws a map of one row; see docs/map.md.\n\n\
 Examples:\n  \
-    weeder record --out row.csv && weeder replay row.csv\n  \
+    weeder record --out row.csv                          then compare it: weeder replay row.csv\n  \
     weeder record --out field --all                      every row, a log for each in the folder field\n  \
     weeder record --out field --all --gps left=/dev/ttyUSB0    with a receiver in left.csv\n  \
     weeder record --out field.csv --gps /dev/ttyUSB0 --gps-baud 38400 --beam-ahead 620")]

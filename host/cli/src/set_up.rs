@@ -22,11 +22,12 @@ use link::{ConsoleLine, EventLine, Link, LinkError, Mode, Status, advice};
 use mechanics::design::Design;
 use mechanics::machine::{Input, Machine};
 use mechanics::swing::Swing;
-use mechanics::unit::MM;
+use mechanics::unit::{MM, SECOND};
 use set_up::circle::Arm;
 use set_up::{ManualStep, SetUp, Task, steps};
+use std::collections::BTreeMap;
 use std::fmt;
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, TryRecvError};
 
@@ -215,7 +216,8 @@ impl Guide {
             say!("  Warning: {warning}")?;
         }
         let width_mm = self.tool_width_mm().context("the tool's width was not given in step 3");
-        let expected = width_mm.and_then(|width_mm| simulated::expected(&settings, width_mm, &self.state.measured));
+        let machine = width_mm.and_then(|_| self.machine.map_or_else(|| asked(&self.state), Ok));
+        let expected = machine.and_then(|machine| simulated::expected(&settings, &machine));
         say!("  Expected: {}", expected.unwrap_or_else(|error| format!("not calculated, because {error:#}")))?;
         say!("  The measurements are in {}.", self.path.display())?;
         say!("  Next, read docs/work.md (in a release: manual/docs/work.md).")
@@ -239,6 +241,8 @@ impl Guide {
         parse: impl Fn(&str) -> Result<T, String>,
     ) -> Result<T> {
         loop {
+            // At a terminal, a line that was typed before the question is no answer to it.
+            while io::stdin().is_terminal() && self.obey_typed()? {}
             let mut out = io::stdout().lock();
             write!(out, "  {question}{}: ", shown.map(|shown| format!(" [{shown}]")).unwrap_or_default())?;
             out.flush()?;
@@ -295,7 +299,7 @@ impl Guide {
                 Task::SetMargin => self.set_margin()?,
             }
         }
-        // A long lead comes with a lower top speed, which is not in the tasks.
+        // A lower top speed and a trailing arm's margin are not in the tasks.
         let mut to_set: Vec<Setting> = calculated.iter().map(|&(setting, _)| setting).collect();
         for task in tasks {
             if let Task::Set(setting, _) = *task
@@ -304,17 +308,21 @@ impl Guide {
                 to_set.push(setting);
             }
         }
-        // Until they do not contradict the others.
+        self.set(&to_set, &calculated).map(drop)
+    }
+
+    /// Asks for settings until they do not contradict the others, and sets them.
+    fn set(&mut self, to_set: &[Setting], calculated: &[(Setting, u16)]) -> Result<Vec<(Setting, u16)>> {
         loop {
             let mut wanted = Vec::new();
-            for &setting in &to_set {
+            for &setting in to_set {
                 let offered = calculated.iter().find(|(offered, _)| *offered == setting).map(|&(_, value)| value);
                 wanted.push((setting, self.value(setting, offered)?));
             }
             let pushed = self.push(&wanted);
             match pushed.as_ref().map_err(Error::downcast_ref) {
                 Err(Some(error @ SettingsError::Contradiction(_))) if !wanted.is_empty() => tell!("  error: {error}"),
-                _ => return pushed,
+                _ => return pushed.map(|()| wanted),
             }
         }
     }
@@ -433,9 +441,11 @@ fn written(name: &str, value: f64) -> String {
     input.map_or_else(String::new, |input| format!("{name} = {}\n", Input { value, ..input }.written()))
 }
 
-/// The machine of the measures that were asked. The rest is the paper's.
+/// The machine of the measures that were asked. The rest is the paper's, with a blade for which the default leads hold.
 fn asked(state: &State) -> Result<Machine> {
-    let text: String = state.asked.iter().map(|(key, value)| written(key, *value)).collect();
+    let mut measures = BTreeMap::from([("intra_row.blade_height".to_owned(), 2.5)]);
+    measures.extend(state.asked.clone());
+    let text: String = measures.iter().map(|(key, value)| written(key, *value)).collect();
     Ok(mechanics::file::parse(Path::new("the machine"), &text)?)
 }
 
@@ -444,5 +454,6 @@ fn take_arm(measured: &mut SetUp, machine: &Machine) {
     let tool_mm = MM.value(machine.intra_row.width).ceil() as u16;
     measured.trailing_tool_mm = (machine.swing.arm_trails > 0).then_some(tool_mm);
     let length_mm = MM.value(machine.intra_row.shank_length);
-    measured.arm = Arm { length_mm, us_for_90: machine.swing.pulse_for_90 };
+    let ms_for_90 = 1500.0 * SECOND.value(machine.swing.servo_time_60);
+    measured.arm = Arm { length_mm, us_for_90: machine.swing.pulse_for_90, ms_for_90 };
 }

@@ -63,7 +63,7 @@ Example: weeder settings push machine.toml --port /dev/ttyACM0")]
         ports: Ports,
     },
     /// List the settings that differ between file and machine; the status is 1 if one does.
-    #[command(after_help = "Example: weeder settings diff machine.toml && echo the same")]
+    #[command(after_help = "Example: weeder settings diff machine.toml")]
     Diff {
         /// A file for all rows, or a folder with a file for each row; - for standard input.
         #[arg(value_name = "FILE.toml|FOLDER", value_parser = source::file())]
@@ -97,7 +97,11 @@ fn pull(file: Option<&OutName>, replace: Replace, json: bool, chosen: &Chosen) -
         file => Some(file.to_owned()),
     };
     let pulled = chosen.each(|row, link| {
-        let shown = settings::read_shown(link)?;
+        let lines = settings::read_lines(link)?;
+        if let Some(other) = settings::other_version(link.version(), &lines) {
+            tell!("{}: {other}", row.name);
+        }
+        let shown = Shown::by(&lines);
         // Another version's status may be unknown.
         if settings::status(link).is_ok_and(|status| status.alarm == Some(Alarm::SettingsLost)) {
             const LOST: &str = "the machine has lost its settings, or is new (alarm 5-1): it has the factory's";

@@ -140,7 +140,10 @@ pub enum Problem {
     )]
     Overlap(Box<[Canopy; 2]>),
     /// The row is too long.
-    #[error("the row is {} m long: it has to be at most {} m", (.0 / 1000.0).ceil(), MAX_LENGTH_MM / 1000.0)]
+    #[error(
+        "the row is {} m long, with half a spacing at either end: it has to be at most {} m",
+        (.0 / 1000.0).ceil(), MAX_LENGTH_MM / 1000.0
+    )]
     Length(f64),
     /// The row is empty.
     #[error("the row is empty: it needs at least one plant or weed")]
@@ -168,7 +171,7 @@ impl Row {
     /// A row of canopies, in any order.
     ///
     /// # Errors
-    /// If there are none, one is malformed, or two overlap.
+    /// If there are none, one is malformed, two overlap, or the row is too long.
     pub fn new(canopies: Vec<Canopy>) -> Result<Self, Problem> {
         if canopies.is_empty() {
             return Err(Problem::Empty);
@@ -182,17 +185,19 @@ impl Row {
         canopies.sort_by(|(_, a), (_, b)| a.position_mm.total_cmp(&b.position_mm));
         for pair in canopies.windows(2) {
             let ((_, before), (mark, canopy)) = (&pair[0], &pair[1]);
-            let length_mm = canopy.position_mm - canopies[0].1.position_mm;
-            let problem = if before.span_mm().end >= canopy.span_mm().start {
-                Problem::Overlap(Box::new([canopy.clone(), before.clone()]))
-            } else if length_mm > MAX_LENGTH_MM {
-                Problem::Length(length_mm)
-            } else {
-                continue;
-            };
-            return Err((*mark, problem));
+            if before.span_mm().end >= canopy.span_mm().start {
+                return Err((*mark, Problem::Overlap(Box::new([canopy.clone(), before.clone()]))));
+            }
         }
-        Ok(Self::of(canopies.into_iter().map(|(_, canopy)| canopy).collect(), None))
+        let last = canopies.last().map(|(mark, _)| *mark);
+        let row = Self::of(canopies.into_iter().map(|(_, canopy)| canopy).collect(), None);
+        if let Some(mark) = last {
+            let Range { start, end } = row.span_mm();
+            if end - start > MAX_LENGTH_MM {
+                return Err((mark, Problem::Length(end - start)));
+            }
+        }
+        Ok(row)
     }
 
     /// A row of these canopies alone.
@@ -347,8 +352,9 @@ mod tests {
             ("18446744073709551616,150,plant\n", "row.csv, line 2: position_mm is 18446744073709552000: it has to be"),
             (
                 "-9e6,150,plant\n9e6,150,plant\n",
-                "row.csv, line 3: the row is 18000 m long: it has to be at most 6000 m",
+                "row.csv, line 3: the row is 36000 m long, with half a spacing at either end: it has to be",
             ),
+            ("0,150,plant\n4e6,150,plant\n", "row.csv, line 3: the row is 8000 m long"),
             (
                 "750,150,plant\n250,150,plant\n700,20,weed\n",
                 "row.csv, line 2: the plant at 750 mm and the weed at 700 mm overlap",

@@ -84,11 +84,11 @@ impl Recorder {
         self.receiver.wheel_lost();
     }
 
-    /// The receiver's port is there, of this name.
-    pub fn found(&mut self, time_ms: u64, port: &str) -> Lines {
+    /// The receiver is there: the name of its port, or that it sends again.
+    pub fn found(&mut self, time_ms: u64, text: &str) -> Lines {
         self.sentences = Finder::default();
         (self.heard_ms, self.useless_since_ms, self.useless) = (Some(time_ms), Some(time_ms), NO_SENTENCE);
-        vec![(Kind::GpsFound, port.to_owned())]
+        vec![(Kind::GpsFound, text.to_owned())]
     }
 
     /// It is gone; why.
@@ -101,8 +101,8 @@ impl Recorder {
     /// Takes received bytes, or none.
     pub fn take(&mut self, time_ms: u64, bytes: &[u8]) -> Lines {
         let mut lines = Lines::new();
-        if !bytes.is_empty() {
-            self.heard_ms = Some(time_ms);
+        if !bytes.is_empty() && self.heard_ms.replace(time_ms).is_none() {
+            lines = self.found(time_ms, "the receiver sends again");
         }
         for &byte in bytes {
             let Some(sentence) = self.sentences.take(byte) else { continue };
@@ -200,6 +200,15 @@ mod tests {
         assert_eq!(kinds(&told), [Kind::GpsLost, Kind::GpsMark, Kind::GpsMark], "{told:?}");
         assert_eq!(told[2].1, "no fix");
         assert_eq!(kinds(&recorder.lost("unplugged")), [Kind::GpsLost]);
+    }
+
+    #[test]
+    fn a_receiver_that_sends_again_is_found_and_its_first_bytes_are_not_useless() {
+        let mut recorder = connected();
+        recorder.take(100, format!("{GGA}\r\n").as_bytes());
+        assert_eq!(recorder.take(6000, b"")[0].0, Kind::GpsLost);
+        assert_eq!(kinds(&recorder.take(8000, &GGA.as_bytes()[..5])), [Kind::GpsFound]);
+        assert_eq!(recorder.take(8100, format!("{}\r\n", &GGA[5..]).as_bytes())[0], (Kind::Gps, GGA.to_owned()));
     }
 
     #[test]

@@ -159,10 +159,11 @@ fn spacings_mm(job: &Job) -> Vec<f64> {
         let is_plant =
             |event: &&Event| matches!(event.kind, EventKind::Detection { class: Class::Plant | Class::Unknown, .. });
         let plants: Vec<f64> = stretch.events.iter().filter(is_plant).map(|plant| plant.distance_m).collect();
-        // Both are known by the wheel's distance.
-        let rests = || stretch.ground.iter().filter(|ground| ground.did == Did::Rolled).map(|rest| &rest.distance_m);
+        // Both are known by the wheel's distance. A day has few rests, and many swings.
+        let rests = stretch.ground.iter().filter(|ground| ground.did == Did::Rolled).map(|rest| &rest.distance_m);
+        let rests: Vec<_> = rests.collect();
         let is_spacing =
-            |pair: &&[f64]| pair[1] > pair[0] && !rests().any(|rest| rest.start < pair[1] && pair[0] <= rest.end);
+            |pair: &&[f64]| pair[1] > pair[0] && !rests.iter().any(|rest| rest.start < pair[1] && pair[0] <= rest.end);
         spacings.extend(plants.windows(2).filter(is_spacing).map(|pair| 1000.0 * (pair[1] - pair[0])));
     }
     spacings

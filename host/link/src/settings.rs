@@ -24,6 +24,8 @@ pub enum SettingsError {
     Contradiction(String),
     #[error("{0}. The machine does not know it either, and nothing was sent")]
     NotKnown(String),
+    #[error("{0}. Some settings may be set and not saved: `revert` takes them back")]
+    NotSaved(LinkError),
     #[error("{setting} was set to {wanted} and is {found}: try again, and see to the supply if it stays so")]
     NotTaken { setting: String, wanted: u16, found: u16 },
 }
@@ -84,7 +86,7 @@ pub fn explain(contradiction: Contradiction) -> String {
 /// # Errors
 /// If the console fails, or the firmware lacks a setting of this program or has a value outside of its range.
 pub fn read(link: &mut Link) -> Result<Settings, SettingsError> {
-    let lines = link.ask("get")?;
+    let lines = read_lines(link)?;
     let shown = Shown::by(&lines);
     match other_version(link.version(), &lines) {
         Some(other) if !shown.missing.is_empty() => Err(SettingsError::Other(other)),
@@ -97,7 +99,16 @@ pub fn read(link: &mut Link) -> Result<Settings, SettingsError> {
 /// # Errors
 /// If the console fails.
 pub fn read_shown(link: &mut Link) -> Result<Shown, LinkError> {
-    Ok(Shown::by(&link.ask("get")?))
+    Ok(Shown::by(&read_lines(link)?))
+}
+
+/// The lines that show all settings in use. Asks again if a setting is missing: noise may have damaged its line.
+///
+/// # Errors
+/// If the console fails.
+pub fn read_lines(link: &mut Link) -> Result<Vec<String>, LinkError> {
+    let lines = link.ask("get")?;
+    if Shown::by(&lines).missing.is_empty() { Ok(lines) } else { link.ask("get") }
 }
 
 /// The settings of a machine, whose firmware may have another version.
@@ -107,6 +118,8 @@ pub struct Shown {
     pub settings: Settings,
     /// Settings of this program that the machine does not have, or whose value is outside of this program's range.
     pub missing: Vec<Setting>,
+    /// The machine's own ranges of the settings that are not missing.
+    pub ranges: Vec<(Setting, RangeInclusive<u16>)>,
     /// Settings, or values of settings, that only the machine's version has.
     pub others: Vec<OtherSetting>,
 }
@@ -135,6 +148,9 @@ impl Shown {
                 && shown.settings.set(setting, value).is_ok()
             {
                 shown.missing.retain(|missing| *missing != setting);
+                if let ConsoleLine::Setting { least, greatest, .. } = ConsoleLine::parse(line) {
+                    shown.ranges.push((setting, least..=greatest));
+                }
             } else if let ConsoleLine::Setting { name, value, unit, least, greatest, is_switched, .. } =
                 ConsoleLine::parse(line)
             {
@@ -308,6 +324,11 @@ pub fn push(
     if !wants_calibration && !shown.missing.contains(&Setting::TicksPerM) {
         follow_wheel(before, &mut after);
     }
+    let is_beyond = |(setting, own): &&(Setting, RangeInclusive<u16>)| !own.contains(&after.get(*setting));
+    if let Some((setting, own)) = shown.ranges.iter().find(is_beyond) {
+        let problem = format!("the machine takes {} from {} to {}", name(*setting), own.start(), own.end());
+        return Err(SettingsError::Contradiction(problem));
+    }
     if let Some(contradiction) = after.contradiction().filter(|_| shown.missing.is_empty()) {
         return Err(SettingsError::Contradiction(explain(contradiction)));
     }
@@ -317,8 +338,9 @@ pub fn push(
         return Err(SettingsError::AtWork);
     }
     let commands = steps.iter().map(|&(setting, value)| format!("set {} {value}", name(setting)));
-    for command in commands.chain(changed.iter().map(|(_, command)| command.clone())) {
-        link.ask(&command)?;
+    for (sent, command) in commands.chain(changed.iter().map(|(_, command)| command.clone())).enumerate() {
+        let failed = |error| if sent == 0 { SettingsError::Link(error) } else { SettingsError::NotSaved(error) };
+        link.ask(&command).map_err(failed)?;
     }
     let found = read_shown(link)?;
     let differs = |&setting: &Setting| {
@@ -332,7 +354,7 @@ pub fn push(
         return Err(SettingsError::NotTaken { setting: name(setting), wanted, found });
     }
     if save {
-        link.ask("save")?;
+        link.ask("save").map_err(SettingsError::NotSaved)?;
     }
     let set = Setting::all().filter(|&setting| before.get(setting) != after.get(setting)).map(name);
     Ok(set.chain(changed.into_iter().map(|(name, _)| name)).collect())

@@ -35,7 +35,7 @@ pub fn read(path: &Path) -> Result<Named, FileError> {
 }
 
 /// Writes all settings of a machine into a file, also those that only the machine knows. An existing file keeps its
-/// comments, and must be a settings file.
+/// comments, loses settings that the machine does not show, and must be a settings file.
 ///
 /// # Errors
 /// As [`read`], and if the file cannot be written.
@@ -132,6 +132,10 @@ fn updated(path: &Path, old: &str, shown: &Shown) -> Result<String, FileError> {
         // Moves its comments as well.
         document.insert_formatted(&Key::new(name(Setting::MergeGapMm)).with_leaf_decor(key.leaf_decor().clone()), item);
     }
+    document.retain(|key, _| {
+        let is_known = Setting::find(key.as_bytes()).is_some_and(|setting| !shown.missing.contains(&setting));
+        is_known || shown.others.iter().any(|other| other.name == key)
+    });
     let known = Setting::all().filter(|setting| !shown.missing.contains(setting)).map(|setting| {
         let comment = format!("\n# {}\n# {}\n", help(setting), range(setting));
         (name(setting), shown.settings.get(setting), setting.is_switched(), comment)
@@ -222,6 +226,15 @@ mod tests {
         assert!(new.starts_with("# my machine\nk = 3 # five plants\n\nwheel_mm = 400\n"), "{new}");
         assert!(new.contains("\nmargin_mm = 50\n") && new.ends_with("\n# the end\n"), "{new}");
         assert_eq!(updated(Path::new("machine.toml"), &new, &shown(Settings::new())).unwrap(), new);
+    }
+
+    #[test]
+    fn a_value_that_the_machine_does_not_show_leaves_the_file() {
+        let old = "k = 5 # five plants\nlead_out_ms = 999\ntilt_mm = 7\n";
+        let shown = Shown { missing: vec![Setting::LeadOutMs], ..Shown::default() };
+        let new = updated(Path::new("machine.toml"), old, &shown).unwrap();
+        assert!(new.starts_with("k = 3 # five plants\n"), "{new}");
+        assert!(!new.contains("lead_out_ms = ") && !new.contains("tilt_mm"), "{new}");
     }
 
     #[test]

@@ -239,3 +239,41 @@ fn a_merge_gap_in_ticks_is_pushed_to_machines_of_its_version_and_of_this_one() {
         assert_eq!(pushed, changed.into_iter().collect::<Vec<_>>(), "{is_old} {ticks}");
     }
 }
+
+#[test]
+fn settings_are_asked_for_again_after_a_damaged_line() {
+    let (mut machine, mut asked) = (machine(), 0);
+    let mut link = link(move |line| {
+        asked += usize::from(line == "get");
+        let damaged = if asked == 1 { "lead_out_m~=" } else { "lead_out_ms=" };
+        String::from_utf8(machine(line)).expect("it is text").replace("lead_out_ms=", damaged).into_bytes()
+    });
+    assert!(settings::read_shown(&mut link).expect("the console answers").missing.is_empty());
+}
+
+#[test]
+fn a_value_outside_of_the_machine_s_own_range_is_found_before_anything_is_sent() {
+    let mut machine = machine();
+    let mut link = link(move |line| {
+        assert!(!line.starts_with("set "), "`{line}` was typed");
+        String::from_utf8(machine(line)).expect("it is text").replace("from 1 to 15", "from 1 to 9").into_bytes()
+    });
+    let wanted = [(settings::Setting::MarginMm, 20), (settings::Setting::K, 15)];
+    let error = settings::push(&mut link, &wanted, &[], false).unwrap_err().to_string();
+    assert_eq!(error, "the machine takes k from 1 to 9; nothing was sent");
+}
+
+#[test]
+fn an_error_between_two_settings_says_that_the_first_may_be_set() {
+    let wanted = [(settings::Setting::WheelMm, 500), (settings::Setting::MarginMm, 20)];
+    for (wanted, is_by_half) in [(&wanted[..], true), (&wanted[1..], false)] {
+        let mut machine = machine();
+        let mut link = link(move |line| match line {
+            "set margin_mm 20" => b"error: noise\r\n".to_vec(),
+            line => machine(line),
+        });
+        let error = settings::push(&mut link, wanted, &[], true).unwrap_err().to_string();
+        assert!(error.starts_with("the firmware answers `set margin_mm 20` with `error: noise`"), "{error}");
+        assert_eq!(error.ends_with("not saved: `revert` takes them back"), is_by_half, "{error}");
+    }
+}

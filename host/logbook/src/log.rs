@@ -41,7 +41,7 @@ pub enum Kind {
     Answer,
     /// Positions of beam and tool relative to a satellite receiver's antenna.
     Antenna,
-    /// The receiver's port was opened; its name.
+    /// The receiver's port was opened, and its name; or the receiver sends again.
     GpsFound,
     /// The receiver's port is gone, or silent; why.
     GpsLost,

@@ -10,8 +10,9 @@
 //! - A detection's edges are right to [`DETECTION_TICKS`]. The lead of a swing depends on the speed, which the log
 //!   holds ten times a second. So a swing may differ by [`SWING_TICKS`], and by the distance that the machine travels
 //!   in [`SWING_MS`]: 17 mm at 2.5 km/h. The speed also decides whether the gap between two zones is long enough to
-//!   swing in. So the log is replayed at three paces: even, and as slow and as fast as the log allows. A swing differs
-//!   only if no pace reproduces it.
+//!   swing in. So the log is replayed at three paces: even, and as slow and as fast as the log allows. At the slow pace
+//!   detections end [`DETECTION_TICKS`] earlier, and at the fast pace later. A swing differs only if no pace reproduces
+//!   it.
 //! - The votes of a detection depend on the speed class, which the line does not tell. Votes agree if any possible
 //!   speed class gives them. Detections from before the start of the log are taken as logged.
 //! - The log does not hold the position of a change of state. The next swing shows the change, and its position is not
@@ -19,7 +20,8 @@
 //!   of a typed command is not exact: a busy PC records it late.
 //! - An alarm from the encoder, the beam, the end switch or the stack depends on inputs that the log lacks. The replay
 //!   raises it at its logged position.
-//! - If a log begins on ground that was already seen, the tool's swings there are not compared.
+//! - If a log begins on ground that was already seen, the tool's swings there are not compared. With
+//!   `guard_spacing_mm` none is compared until a `start` forgets the ground.
 //! - A refused command is left out, because it had no effect.
 //! - A replay ends at a bench command (`servo`, `calibrate`, `test`), where examples were forgotten, or where a second
 //!   beam was set. A log of a machine with a second beam is not replayed.
@@ -152,9 +154,8 @@ fn replay_stretch(stretch: &Stretch, replayed: &mut Replayed, advance: &mut impl
     }
     let compared_from = stretch.compared_from();
     if compared_from > i32::MIN {
-        replayed.notes.push(format!(
-            "the log begins with ground already seen: swings before pos={compared_from} are not compared"
-        ));
+        let before = if compared_from < i32::MAX { format!(" before pos={compared_from}") } else { String::new() };
+        replayed.notes.push(format!("the log begins with ground already seen: swings{before} are not compared"));
     }
 
     let played = Pace::ALL.into_iter().map(|pace| play(stretch, pace, advance)).collect::<Result<Vec<_>, _>>()?;
@@ -278,6 +279,63 @@ mod tests {
         let replayed = replay(&log).unwrap();
         assert_eq!((replayed.difference, replayed.swings), (None, 1));
         assert!(replayed.farthest_swing <= 4, "{} ticks", replayed.farthest_swing);
+    }
+
+    /// The log of a machine that is at work from before the first status on.
+    fn log_at_work(happens: &[(u64, Kind, &str)], status: impl Fn(usize) -> String) -> Vec<Entry> {
+        let mut log = log(happens);
+        for (number, entry) in log.iter_mut().filter(|entry| entry.kind == Kind::Status).enumerate() {
+            entry.text = format!("state=work pos={} speed_mm_s=500 {}", 95 * number, status(number));
+        }
+        log
+    }
+
+    #[test]
+    fn work_that_began_before_the_log_began_where_the_unseen_ground_says() {
+        // Work began at 28 ticks. The log begins with the tool out, or between the swing and its line.
+        let log = log_at_work(&[(9, Kind::Event, "swing tool=in pos=846")], |number| {
+            let tool = if number < 9 { "out" } else { "in" };
+            format!("tool={tool} windows=0 unseen_mm={}", 468_usize.saturating_sub(50 * number))
+        });
+        for (first, swings) in [(4, 1), (8, 1), (9, 0)] {
+            let replayed = replay(&[&log[..1], &log[1 + first..]].concat()).unwrap();
+            assert_eq!((replayed.difference, replayed.swings), (None, swings), "from status {first}");
+        }
+    }
+
+    #[test]
+    fn after_plants_before_the_log_swings_for_expected_plants_are_not_compared_until_a_start() {
+        for (guard_spacing_mm, starts_at, is_compared) in [(0, 30, true), (500, 30, false), (500, 9, true)] {
+            let mut log = log_at_work(&[(11, Kind::Event, "swing tool=out pos=1050")], |number| {
+                format!("tool=in windows=0 unseen_mm={}", if number == starts_at { 450 } else { 0 })
+            });
+            let text = format!("guard_spacing_mm={guard_spacing_mm}");
+            log.insert(1, Entry { number: 2, time_ms: 0, kind: Kind::Setting, text });
+            let replayed = replay(&log).unwrap();
+            assert_eq!(replayed.difference.is_some(), is_compared, "{guard_spacing_mm} {starts_at}");
+        }
+    }
+
+    #[test]
+    fn an_expected_plant_that_is_classified_some_ticks_earlier_or_later_is_no_difference() {
+        // The tool goes out for the expected plant, or later for the plant itself.
+        for (plant, out, back) in [(1177, 1498, 2275), (1187, 1635, 2285)] {
+            let rest = "delay=669 hold=467 actuation=1136";
+            let second = format!("unknown pos={plant} votes=0 spacing={} {rest}", plant - 100);
+            let mut log = log(&[
+                (0, Kind::Event, "state is=work"),
+                (4, Kind::Event, &format!("unknown pos=100 votes=0 spacing=100 {rest}")),
+                (12, Kind::Event, "swing tool=in pos=1199"),
+                (15, Kind::Event, &second),
+                (out / 95, Kind::Event, &format!("swing tool=out pos={out}")),
+                (24, Kind::Event, &format!("swing tool=in pos={back}")),
+            ]);
+            for setting in ["guard_spacing_mm=500", "stem_zone_mm=90"] {
+                log.insert(1, Entry { number: 2, time_ms: 0, kind: Kind::Setting, text: setting.to_owned() });
+            }
+            let replayed = replay(&log).unwrap();
+            assert_eq!((replayed.difference, replayed.objects, replayed.swings), (None, 2, 3), "{plant}");
+        }
     }
 
     #[test]

@@ -104,8 +104,7 @@ impl Design {
         let wheel_numeric = f64::from(soil.cone_index * wheel.width * wheel.diameter / wheel_load);
         let rolling_resistance_coefficient = eq::rolling_resistance_coefficient(wheel_numeric);
         let rolling_resistance = rolling_resistance_coefficient * weight;
-        let width_of_cut = f64::from(inter_row.tools) * inter_row.width + intra_row.width;
-        let draft = soil.unit_draft * soil.depth * width_of_cut;
+        let draft = soil.unit_draft * soil.depth * machine.width_of_cut();
         let acceleration_force = weeder.mass * (weeder.speed / weeder.acceleration_time);
         let tractive_force = rolling_resistance + draft + acceleration_force;
         let power = eq::power(tractive_force, weeder.speed, engine.safety_factor);

@@ -267,6 +267,11 @@ impl Machine {
         self.inter_row.tools + 1
     }
 
+    /// Width that all tools cut together.
+    pub fn width_of_cut(&self) -> Length {
+        f64::from(self.inter_row.tools) * self.inter_row.width + self.intra_row.width
+    }
+
     /// Checks every value against its range, and values that depend on each other.
     ///
     /// # Errors

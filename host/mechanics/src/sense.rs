@@ -24,6 +24,9 @@ const ENGINE_EXCESS: f64 = 2.0;
 const SOFT_WHEEL_NUMERIC: f64 = 15.0;
 const TILLED_WHEEL_NUMERIC: f64 = 25.0;
 
+/// The figures of the tools between the rows.
+const BETWEEN_ROWS: [&str; 4] = ["sweep_width", "apex_angle", "inter_row_bending_moment", "inter_row_shank_diameter"];
+
 /// A line of interpretation, and whether it asks for a change.
 type Sense = (String, bool);
 
@@ -58,7 +61,12 @@ impl Design {
     /// machine.
     pub fn figures(&self, machine: &Machine) -> Vec<Figure> {
         let parts = [Self::traction, Self::tools, Self::shanks, Self::drive, Self::wheel_and_handle, Self::capacity];
-        parts.into_iter().flat_map(|part| part(self, machine)).collect()
+        let mut figures: Vec<Figure> = parts.into_iter().flat_map(|part| part(self, machine)).collect();
+        let has_none = machine.inter_row.tools == 0;
+        for figure in figures.iter_mut().filter(|figure| has_none && BETWEEN_ROWS.contains(&figure.key)) {
+            (figure.sense, figure.concern) = fine("the machine has no tools between the rows".to_owned());
+        }
+        figures
     }
 
     fn traction(&self, machine: &Machine) -> Vec<Figure> {
@@ -138,8 +146,11 @@ impl Design {
             fine(format!("weeds slide along the sweeps' {}", written(apex, DEGREE)))
         };
         let tools = machine.tools();
-        let fit_sense = if tools > self.tools {
-            concern(format!("the machine has {tools}: they do not fit into its working width"))
+        let cut = machine.width_of_cut();
+        // Widths that fill it exactly must not fail by rounding.
+        let fit_sense = if f64::from(cut / machine.weeder.working_width) > 1.0 + 1e-9 {
+            let needed = written(cut, MM);
+            concern(format!("the machine has {tools}: they do not fit into its working width, and need {needed}"))
         } else {
             fine(format!("the machine has {tools}: they fit into its working width"))
         };

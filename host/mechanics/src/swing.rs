@@ -5,14 +5,15 @@
 //! follow as well. The zone is longer than the protected width, because a stem may stand off the middle. Its leads are
 //! shorter, by what its circle allows at the top speed. The margin covers a wheel and a servo that were not measured yet.
 //! Top speed and gap between pulses are the board's, or the firmware's defaults. If the lead is too long for the beam's
-//! distance, the top speed is lowered.
+//! distance, the top speed is lowered. A trailing arm needs a wider margin.
 //!
 //! The arm swings sideways about a pivot beside the row: at an angle the tool's middle is `arm * sin(angle)` from the
 //! row's line. A servo turns at full speed without load. Its speed falls in a straight line to zero at the stall
 //! torque. The load is the torque of the whole blade in the soil (above Eq. 10); the paper sizes its servo by it.
 
+use crate::figure::written;
 use crate::machine::{Machine, SwingInputs};
-use crate::unit::{KG_CM, MM};
+use crate::unit::{KG_CM, KM_H, MM};
 use link::settings::{Setting, Settings, explain, name};
 use serde::Serialize;
 use set_up::{circle, saved_ms};
@@ -50,12 +51,16 @@ pub struct Swing {
     pub loaded_ms: f64,
     /// A lower top speed, mm/s, at which the beam sees a plant early enough for the lead. `None` if none is needed.
     pub top_speed_mm_s: Option<u32>,
+    /// The top speed with these settings, mm/s: the lower one, or the board's.
+    pub highest_mm_s: u32,
     /// Lead of the command to leave the row, ms.
     pub lead_out_ms: u32,
     /// Lead of the command to come back, ms.
     pub lead_in_ms: u32,
     /// How much wider the margin has to be because a trailing arm carries the tool along the row, mm; 0 for a pendulum.
     pub arm_margin_mm: u32,
+    /// That margin, mm. `None` for a pendulum, or if the board's is as wide.
+    pub margin_mm: Option<u32>,
     /// Height by which a pendulum lifts the blade over the stroke, mm; 0 for a trailing arm.
     pub lift_mm: f64,
     /// Width on either side of the row that neither tool nor sweeps weed, mm.
@@ -141,31 +146,31 @@ impl Swing {
         let out_us = if is_longer { in_us + stroke_us } else { in_us - stroke_us };
         let lead_out_ms = (lead_out_ms - saved_out_ms).ceil().max(0.0);
         let lead_in_ms = (dead_ms(inputs.least_dead_time.min(inputs.most_dead_time)) + saved_in_ms).floor();
+        let (arm_margin_mm, lift_mm) = if inputs.arm_trails > 0 { (carried_mm.ceil(), 0.0) } else { (0.0, stroke_mm) };
+        // The board's margin may be measured, and then it has the arm's part.
+        let board_mm = f64::from(settings.get(Setting::MarginMm));
+        let wide_mm = if arm_margin_mm > 0.0 { f64::from(Setting::MarginMm.default()) + arm_margin_mm } else { 0.0 };
         let mut after = settings.clone();
         for (setting, value, advice) in [
             (Setting::ServoInUs, in_us, "fit the tool at another one"),
             (Setting::ServoOutUs, out_us, "take a longer arm, or fit the tool at another servo_in_us"),
             (Setting::LeadOutMs, lead_out_ms, "take a faster or a stronger one"),
             (Setting::LeadInMs, lead_in_ms, "take one with a shorter dead time"),
+            (Setting::MarginMm, wide_mm.max(board_mm), "take a longer arm, or a pendulum"),
         ] {
             // `as` saturates: a negative pulse becomes 0, which is out of range.
             if after.set(setting, value as u16).is_err() {
                 let (name, least, greatest) = (name(setting), setting.least(), setting.greatest());
                 return Err(format!(
-                    "the servo needs {name} {value}, and the firmware takes {least} to {greatest}: {advice}"
+                    "the swing needs {name} {value}, and the firmware takes {least} to {greatest}: {advice}"
                 ));
             }
         }
-        let (arm_margin_mm, lift_mm) = if inputs.arm_trails > 0 { (carried_mm.ceil(), 0.0) } else { (0.0, stroke_mm) };
-        // A trailing arm needs a wider margin. The board's may be measured, and then it has the arm's part.
-        let wide_mm = if arm_margin_mm > 0.0 { f64::from(Setting::MarginMm.default()) + arm_margin_mm } else { 0.0 };
-        let margin_mm = (wide_mm as u16).clamp(settings.get(Setting::MarginMm), Setting::MarginMm.greatest());
-        // Margin and speeds are in their ranges.
-        let _ = after.set(Setting::MarginMm, margin_mm);
         let board_mm_s = settings.get(Setting::TopSpeedMmS);
         let speeds = (Setting::TopSpeedMmS.least()..=board_mm_s).rev();
         let mut speeds = speeds.filter(|mm_s| *mm_s == board_mm_s || mm_s.is_multiple_of(SPEED_STEP_MM_S));
         let allowed_mm_s = speeds.find(|&mm_s| {
+            // It is in its range.
             let _ = after.set(Setting::TopSpeedMmS, mm_s);
             after.contradiction().is_none()
         });
@@ -179,11 +184,13 @@ impl Swing {
             unloaded_ms,
             loaded_ms,
             top_speed_mm_s: (allowed_mm_s < board_mm_s).then_some(allowed_mm_s.into()),
+            highest_mm_s: allowed_mm_s.into(),
             lead_out_ms: lead_out_ms as u32,
             lead_in_ms: lead_in_ms as u32,
             arm_margin_mm: arm_margin_mm as u32,
+            margin_mm: (wide_mm > board_mm).then_some(wide_mm as u32),
             lift_mm,
-            unweeded_strip_mm: (from_mm - tool_mm / 2.0).max(0.0),
+            unweeded_strip_mm: if machine.inter_row.tools == 0 { 0.0 } else { (from_mm - tool_mm / 2.0).max(0.0) },
             filling_tool_mm: 2.0 * from_mm,
         })
     }
@@ -197,9 +204,10 @@ impl Swing {
         }
         let slower = self.top_speed_mm_s.map(|mm_s| ("top_speed_mm_s", mm_s));
         let leads = [("lead_out_ms", self.lead_out_ms), ("lead_in_ms", self.lead_in_ms)];
+        let margin = self.margin_mm.map(|mm| ("margin_mm", mm));
         let zone = (self.stem_zone_mm > 0).then_some(("stem_zone_mm", self.stem_zone_mm));
-        // A lower speed comes before the lead that needs it.
-        pulses.into_iter().chain(slower).chain(leads).chain(zone).collect()
+        // A lower speed comes before the lead that needs it, and a wider margin after a shorter lead.
+        pulses.into_iter().chain(slower).chain(leads).chain(margin).chain(zone).collect()
     }
 
     /// The same as lines for the firmware's console.
@@ -227,9 +235,18 @@ impl Swing {
         said.extend(self.top_speed_mm_s.map(|mm_s| {
             format!("With this lead, the beam is far enough ahead up to {mm_s} mm/s. A beam farther ahead allows more.")
         }));
+        let speed = machine.weeder.speed;
+        let speed_mm_s = KM_H.value(speed) / 0.0036;
+        if speed_mm_s > f64::from(self.highest_mm_s) {
+            said.push(format!(
+                "The machine's {} are {speed_mm_s:.0} mm/s. Above {} mm/s, alarm 3-1 ends the work.",
+                written(speed, KM_H),
+                self.highest_mm_s
+            ));
+        }
         said.push(if self.arm_margin_mm > 0 {
             format!(
-                "The trailing arm carries the tool towards the plant, so the margin is {} mm wider: `weeder set-up --machine` adds them.",
+                "The trailing arm carries the tool towards the plant, so the margin is {} mm wider.",
                 self.arm_margin_mm
             )
         } else {
@@ -243,6 +260,22 @@ impl Swing {
                 MM.value(machine.soil.depth)
             )
         });
+        if machine.inter_row.tools == 0 {
+            return said;
+        }
+        let (zone, half) = if self.stem_zone_mm > 0 {
+            ("stem zone", machine.swing.protected / 2.0)
+        } else {
+            ("protection zone", machine.crop.protection_zone)
+        };
+        let beside_mm = MM.value(machine.swing.sweep_from - half);
+        if beside_mm < 0.0 {
+            said.push(format!("The sweeps run {:.0} mm inside the {zone}: start them farther out.", -beside_mm));
+        } else if self.stem_zone_mm > 0 {
+            said.push(format!(
+                "The sweeps start {beside_mm:.0} mm beside the {zone}. They cut plants if the machine strays farther."
+            ));
+        }
         if self.unweeded_strip_mm <= 0.0 {
             said.push("Tool and sweeps leave no strip between them.".to_owned());
             return said;
@@ -344,10 +377,14 @@ mod tests {
     #[test]
     fn the_firmware_takes_each_line_and_a_long_lead_comes_with_the_highest_speed_for_it() {
         // The soil's torque on the paper's blade, and on one of 2.5 mm.
-        // The trailing arm's margin is 26 mm wider. A new board's tool is out at the third pulse.
-        for (kg_cm, arm_trails, pulse_in, slower_mm_s) in
-            [(39.4, 0, 1500.0, Some(1150)), (39.4, 1, 1500.0, Some(1100)), (10.0, 0, 2000.0, None)]
-        {
+        // The trailing arm's margin is 26 mm wider, too wide for the default lead. A new board's tool is out at the last
+        // pulse.
+        for (kg_cm, arm_trails, pulse_in, slower_mm_s) in [
+            (39.4, 0, 1500.0, Some(1150)),
+            (39.4, 1, 1500.0, Some(1100)),
+            (10.0, 1, 1500.0, None),
+            (10.0, 0, 2000.0, None),
+        ] {
             let mut machine = Machine::default();
             (machine.swing.arm_trails, machine.swing.pulse_in) = (arm_trails, pulse_in);
             let swing = Swing::of(&machine, KG_CM.of(kg_cm)).expect("it swings");
@@ -358,9 +395,10 @@ mod tests {
                 assert_eq!(settings.contradiction(), None, "{name} {value}");
             }
             assert_eq!(swing.top_speed_mm_s, slower_mm_s, "{swing:?}");
-            let margin_mm = Setting::MarginMm.default() + swing.arm_margin_mm as u16;
-            settings.set(Setting::MarginMm, margin_mm).expect("it is in its range");
-            assert_eq!(settings.contradiction(), None, "{margin_mm}");
+            assert_eq!(
+                u32::from(settings.get(Setting::MarginMm)),
+                u32::from(Setting::MarginMm.default()) + swing.arm_margin_mm
+            );
             let faster_mm_s = settings.get(Setting::TopSpeedMmS) + SPEED_STEP_MM_S;
             settings.set(Setting::TopSpeedMmS, faster_mm_s).expect("it is in its range");
             assert!(slower_mm_s.is_none() || settings.contradiction().is_some(), "{faster_mm_s}");
@@ -383,19 +421,28 @@ mod tests {
             (
                 changed(|machine| machine.swing.servo_time_60 = SECOND.of(1.5)),
                 [1500, 2000],
-                "the servo needs lead_out_ms 883, and the firmware takes 0 to 500: take a faster or a stronger one",
+                "the swing needs lead_out_ms 883, and the firmware takes 0 to 500: take a faster or a stronger one",
             ),
             (
                 changed(|machine| machine.swing.pulse_for_90 = 2500.0),
                 [1900, 2000],
-                "the servo needs servo_out_us 2635, and the firmware takes 500 to 2500: \
+                "the swing needs servo_out_us 2635, and the firmware takes 500 to 2500: \
                  take a longer arm, or fit the tool at another servo_in_us",
             ),
             (
                 with_tool_of_100_mm(),
                 [700, 600],
-                "the servo needs servo_out_us 405, and the firmware takes 500 to 2500: \
+                "the swing needs servo_out_us 405, and the firmware takes 500 to 2500: \
                  take a longer arm, or fit the tool at another servo_in_us",
+            ),
+            (
+                changed(|machine| {
+                    machine.swing.arm_trails = 1;
+                    machine.swing.widest_canopy = MM.of(450.0);
+                    machine.intra_row.shank_length = MM.of(300.0);
+                }),
+                [1500, 2000],
+                "the swing needs margin_mm 258, and the firmware takes 0 to 200: take a longer arm, or a pendulum",
             ),
         ] {
             let error = Swing::fitted(&machine, KG_CM.of(10.0), &board(pulses)).expect_err("it is refused");
@@ -405,5 +452,44 @@ mod tests {
         let machine = changed(|machine| machine.swing.pulse_in = 2300.0);
         assert!(Swing::of(&machine, KG_CM.of(10.0)).is_err());
         assert!(Swing::fitted(&machine, KG_CM.of(10.0), &board([2300, 1800])).is_ok());
+    }
+
+    #[test]
+    fn a_trailing_arm_s_wider_margin_is_one_of_its_settings() {
+        let mut machine = Machine::default();
+        machine.intra_row.shank_length = MM.of(200.0);
+        machine.swing.widest_canopy = MM.of(300.0);
+        machine.swing.arm_trails = 1;
+        let swing = Swing::of(&machine, KG_CM.of(5.6)).expect("it swings");
+        assert!(swing.set_lines().ends_with(&["set margin_mm 175".to_owned()]), "{:?}", swing.set_lines());
+        // A board whose margin is as wide keeps it.
+        let mut board = Settings::new();
+        board.set(Setting::MarginMm, 180).expect("it is in its range");
+        let swing = Swing::fitted(&machine, KG_CM.of(5.6), &board).expect("it swings");
+        assert_eq!((swing.arm_margin_mm, swing.margin_mm), (125, None));
+    }
+
+    #[test]
+    fn a_machine_that_is_too_fast_and_sweeps_in_the_zone_are_named() {
+        let words = |change: fn(&mut Machine)| {
+            let (mut machine, torque) = (Machine::default(), KG_CM.of(39.4));
+            change(&mut machine);
+            Swing::of(&machine, torque).expect("it swings").sentences(&machine, torque).join(" ")
+        };
+        let slow_servo = words(|machine| machine.swing.servo_time_60 = SECOND.of(0.35));
+        assert!(slow_servo.contains("2.5 km/h are 694 mm/s. Above 650 mm/s, alarm 3-1"), "{slow_servo}");
+        assert!(words(|machine| machine.weeder.speed = KM_H.of(5.0)).contains("Above 1150 mm/s, alarm 3-1"));
+        let inside = words(|machine| {
+            (machine.swing.protected, machine.swing.sweep_from) = (MM.of(90.0), MM.of(20.0));
+        });
+        assert!(inside.contains("The sweeps run 25 mm inside the stem zone:"), "{inside}");
+        let beside = words(|machine| {
+            (machine.swing.protected, machine.swing.sweep_from) = (MM.of(90.0), MM.of(65.0));
+        });
+        assert!(beside.contains("The sweeps start 20 mm beside the stem zone."), "{beside}");
+        assert!(words(|machine| machine.swing.sweep_from = MM.of(20.0)).contains("30 mm inside the protection zone"));
+        let (usual, without) = (words(|_| ()), words(|machine| machine.inter_row.tools = 0));
+        assert!(!usual.contains("alarm 3-1") && !usual.contains("The sweeps"), "{usual}");
+        assert!(!without.contains("sweeps"), "{without}");
     }
 }

@@ -75,6 +75,13 @@ fn tools_fit_into_the_working_width_or_do_not() {
     let tools = |number: f64| figure_with("tools", |machine| machine.inter_row.tools = COUNT.of(number));
     assert_sense(&tools(4.0), false, "the machine has 5: they fit");
     assert_sense(&tools(5.0), true, "the machine has 6: they do not fit");
+    let wide = |mm: f64| figure_with("tools", |machine| machine.intra_row.width = MM.of(mm));
+    assert_sense(&wide(80.0), false, "the machine has 5: they fit");
+    assert_sense(&wide(130.0), true, "they do not fit into its working width, and need 450 mm");
+    for key in ["sweep_width", "apex_angle", "inter_row_bending_moment", "inter_row_shank_diameter"] {
+        let without_sweeps = figure_with(key, |machine| machine.inter_row.tools = 0);
+        assert_sense(&without_sweeps, false, "no tools between the rows");
+    }
 }
 
 #[test]

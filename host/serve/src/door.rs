@@ -31,6 +31,8 @@ pub enum Denial {
     ForeignHost,
     #[error("this request comes from another page: open the address that `weeder serve` printed")]
     ForeignOrigin,
+    #[error("this request names no origin: send the header `Origin` with `http://` and the address in `Host`")]
+    NoOrigin,
     #[error("this phone is not paired: open the address that `weeder serve` printed, and type its code")]
     NotPaired,
 }
@@ -39,7 +41,7 @@ impl Denial {
     pub fn status(self) -> StatusCode {
         match self {
             Denial::ForeignHost => StatusCode::MISDIRECTED_REQUEST,
-            Denial::ForeignOrigin => StatusCode::FORBIDDEN,
+            Denial::ForeignOrigin | Denial::NoOrigin => StatusCode::FORBIDDEN,
             Denial::NotPaired => StatusCode::UNAUTHORIZED,
         }
     }
@@ -77,6 +79,7 @@ impl Door {
         match all(ORIGIN)[..] {
             // A browser omits the origin when a page reads from its own server.
             [] if matches!(*request.method(), Method::GET | Method::HEAD) => {}
+            [] => return Err(Denial::NoOrigin),
             [origin] if origin.strip_prefix(b"http://") == Some(host) => {}
             _ => return Err(Denial::ForeignOrigin),
         }
@@ -131,7 +134,7 @@ mod tests {
             }
         };
         check(&[ADDRESS], &[OWN], [Ok(()); 2]);
-        check(&[ADDRESS], &[], [Ok(()), foreign_origin]);
+        check(&[ADDRESS], &[], [Ok(()), Err(Denial::NoOrigin)]);
         for host in
             ["", "weeder.example:8866", "192.168.1.5", "192.168.1.5:8867", "192.168.1.50:8866", "localhost:8866"]
         {

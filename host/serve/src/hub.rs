@@ -4,9 +4,10 @@
 //! The memory does not grow with the number of pages.
 
 use super::knowledge::Knowledge;
+use control::alarm::Warning;
 use link::moment::Moment;
 use link::session::Unanswered;
-use link::{EventLine, Mode};
+use link::{EventLine, advice};
 use parking_lot::Mutex;
 use serde_json::{Value, json};
 use std::sync::Arc;
@@ -82,7 +83,9 @@ impl Hub {
             }
             "event" => match EventLine::parse(news["said"].as_str().unwrap_or_default()) {
                 Some(EventLine::Warning { .. }) => known["warning"] = news["said"].clone(),
-                Some(event) if ends_warning(event, &known["warning"]) => known["warning"] = Value::Null,
+                Some(event) if warned(&known["warning"]).is_some_and(|warning| advice::ends(event, warning)) => {
+                    known["warning"] = Value::Null;
+                }
                 _ => {}
             },
             _ => {}
@@ -140,12 +143,11 @@ impl Hub {
     }
 }
 
-/// Whether an event ends a warning, as in page/src/panel/machine.ts.
-fn ends_warning(event: EventLine, warning: &Value) -> bool {
-    match event {
-        EventLine::State { mode: Mode::Hold } => warning != OLDER,
-        EventLine::State { .. } | EventLine::Detection { .. } => warning == "warning name=no_plants",
-        _ => false,
+/// The warning in a line.
+fn warned(line: &Value) -> Option<Warning> {
+    match EventLine::parse(line.as_str()?)? {
+        EventLine::Warning { warning } => Some(warning),
+        _ => None,
     }
 }
 

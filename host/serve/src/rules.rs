@@ -51,15 +51,16 @@ pub enum Forbidden {
 /// # Errors
 /// Why it is not allowed, and where it is.
 pub fn allow(line: &str, reach: Reach) -> Result<(), Forbidden> {
+    // Every client may hold. A program may send the line's end too.
+    if link::is_hold(line) {
+        return Ok(());
+    }
     // The machine does not answer a line without a word.
     if !link::is_command(line) || line.trim().is_empty() {
         return Err(Forbidden::NoLine);
     }
-    // Every client may hold. The machine itself reports errors in a line of the operator's.
+    // The machine itself reports errors in a line of the operator's.
     let Reach::Lan { may_start } = reach else { return Ok(()) };
-    if link::is_hold(line) {
-        return Ok(());
-    }
     let action = link::command(line).map_err(|_| Forbidden::Unknown)?.action;
     why_not(action).filter(|&why| !(may_start && why == Forbidden::NoStart)).map_or(Ok(()), Err)
 }
@@ -118,7 +119,7 @@ mod tests {
                 assert_eq!(allow(line, reach), why.map_or(Ok(()), Err), "{line:?} from {reach:?}");
             }
         }
-        for line in ["hold", " hold", "hold   ", "HOLD", "Hold", "hold.", "HOLD !"] {
+        for line in ["hold", " hold", "hold   ", "HOLD", "Hold", "hold.", "HOLD !", "hold\n", "Hold!\r\n"] {
             for reach in [Reach::Here, WATCHING, STARTING] {
                 assert!(link::is_hold(line) && allow(line, reach) == Ok(()), "{line:?} from {reach:?}");
             }

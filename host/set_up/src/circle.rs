@@ -13,11 +13,13 @@ pub struct Arm {
     pub length_mm: f64,
     /// Change of the pulse that turns the servo by 90 degrees, us.
     pub us_for_90: f64,
+    /// The servo's time for 90 degrees without load, ms.
+    pub ms_for_90: f64,
 }
 
 impl Default for Arm {
     fn default() -> Self {
-        Self { length_mm: 350.0, us_for_90: 1000.0 }
+        Self { length_mm: 350.0, us_for_90: 1000.0, ms_for_90: 240.0 }
     }
 }
 
@@ -25,6 +27,11 @@ impl Arm {
     /// How far a stroke of this pulse carries the tool aside, mm.
     pub fn aside_mm(self, pulse_us: u16) -> f64 {
         self.length_mm * (90.0 * f64::from(pulse_us) / self.us_for_90).min(90.0).to_radians().sin()
+    }
+
+    /// The time of a stroke of this pulse without load, ms.
+    pub fn unloaded_ms(self, pulse_us: u16) -> f64 {
+        self.ms_for_90 * f64::from(pulse_us) / self.us_for_90
     }
 
     /// How much farther a trailing arm has to keep off, mm, for a stroke of this pulse. A zone of 0 is a whole canopy: the

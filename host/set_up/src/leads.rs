@@ -5,8 +5,8 @@ use crate::{keeps_stems, stroke_us};
 use control::settings::{Setting, Settings};
 
 /// The servo's scatter beside a stem zone, as a time on its way out and in. The way out has the dead time's scatter, the
-/// load's, and a command's wait for the pulse. The way in has the dead time's only. Leads that are shortened by the same
-/// time on both ways damage plants behind the tool, at 4 km/h twice as many as at 1 km/h.
+/// load's, and a command's wait for the pulse. The way in has the dead time's only: a load makes it safer. Leads that are
+/// shortened by the same time on both ways damage plants behind the tool, at 4 km/h twice as many as at 1 km/h.
 const SCATTER_OUT_MS: f64 = 20.0;
 const SCATTER_IN_MS: f64 = 9.0;
 
@@ -30,7 +30,10 @@ pub(crate) fn leads(timings: &[Timing], settings: &Settings, arm: Arm) -> Vec<(S
     let [saved_out_ms, saved_in_ms] = if keeps_stems(settings) {
         let [top_mm_s, zone_mm] =
             [Setting::TopSpeedMmS, Setting::StemZoneMm].map(|setting| settings.get(setting).into());
-        saved_ms(top_mm_s, travel_ms(timings), zone_mm, arm.aside_mm(stroke_us(settings)))
+        let (pulse_us, longest_ms) = (stroke_us(settings), travel_ms(timings));
+        let saved = |travel_ms: f64| saved_ms(top_mm_s, travel_ms, zone_mm, arm.aside_mm(pulse_us));
+        // The longest travel is one against the soil. The way back may have no load.
+        [saved(longest_ms)[0], saved(longest_ms.min(arm.unloaded_ms(pulse_us)))[1]]
     } else {
         [0, 0]
     };

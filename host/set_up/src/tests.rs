@@ -120,6 +120,17 @@ fn beside_a_stem_s_zone_leads_and_margin_go_up_to_its_circle() {
 }
 
 #[test]
+fn the_way_back_may_have_no_load_so_its_lead_is_that_of_an_unloaded_servo() {
+    let set_up = heard(&[&["servo_out_us=1750"], &["calibrated lead_out_ms=240 lead_in_ms=52 set=yes"; 2]]);
+    let quick = SetUp { arm: Arm { ms_for_90: 120.0, ..Arm::default() }, ..set_up.clone() };
+    let settings = settings(&[(Setting::ServoOutUs, 1750), (Setting::StemZoneMm, 110)]);
+    for (set_up, in_ms) in [(set_up, 78), (quick, 67)] {
+        let leads = [Step::SetLead(Setting::LeadOutMs, 191), Step::SetLead(Setting::LeadInMs, in_ms)];
+        assert_eq!(set_up.missing(&settings)[..2], leads);
+    }
+}
+
+#[test]
 fn a_servo_that_was_timed_by_eye_scatters_by_the_error_of_the_eye() {
     let failed = "calibrated by=none, the end switch did not follow";
     let set_up = heard(&[&[BY_EYE, failed, BY_EYE], MEASURED, MEASURED]);

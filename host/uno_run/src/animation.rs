@@ -142,11 +142,11 @@ impl Run {
     }
 
     fn scheduled<Animation: Node>(&self, mut animation: Animation, frames: &[(f64, String)]) -> Animation {
-        let times: Vec<String> = frames.iter().map(|(share, _)| format!("{share:.4}")).collect();
+        let times: Vec<String> = frames.iter().map(|(share, _)| format!("{share:.7}")).collect();
         let values: Vec<&str> = frames.iter().map(|(_, value)| value.as_str()).collect();
         animation.assign("keyTimes", times.join(";"));
         animation.assign("values", values.join(";"));
-        animation.assign("dur", format!("{:.1}s", self.seconds));
+        animation.assign("dur", format!("{:.3}s", self.seconds));
         animation.assign("repeatCount", "indefinite");
         animation
     }
@@ -207,5 +207,12 @@ mod tests {
             found += 1;
         }
         assert!(found >= 5, "{found}");
+    }
+
+    #[test]
+    fn times_are_fine_enough_for_a_long_row_and_a_short_one() {
+        let frames = [(0.0, "0".to_owned()), (0.123_456_7, "1".to_owned())];
+        let animation = Run { seconds: 0.01 }.value("opacity", &frames, "linear").to_string();
+        assert!(animation.contains(";0.1234567\"") && animation.contains("\"0.010s\""), "{animation}");
     }
 }

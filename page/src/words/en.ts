@@ -286,7 +286,7 @@ export const words = {
     wasHidden: "This tab was hidden meanwhile: keep it in front, and flash it again first.",
     withoutSerial: "Without Web Serial",
     withoutSerialHow: "Save the HEX as a file. avrdude, which the Arduino IDE brings along, writes it:",
-    portIs: "PORT is COM3 or the like on Windows, /dev/ttyACM0 on Linux. Old bootloaders speak at 57600.",
+    portIs: "PORT is COM3 or the like on Windows, /dev/ttyACM0 or /dev/ttyUSB0 on Linux. Old bootloaders speak at 57600.",
 
     // Looking at a log.
     record: "Log",
@@ -346,14 +346,15 @@ export const heard = {
     portInTab: "another tab of this page has a port open: disconnect there or close that tab first, then try again",
     portRefused: "the port cannot be opened: the browser says \u201c{text}\u201d",
     portTaken:
-        "the port cannot be opened. Either another tab or another program has it: close the other tab first, then the serial monitor, the Arduino IDE, or the other program that talks to the Uno. {or} If nothing else has it, pull the cable, plug it in again and choose the port again.",
+        "the port cannot be opened. Either another tab or another program has it: close the other tab first, then the serial monitor, the Arduino IDE or the other program. {or} If nothing else has it, pull the cable, plug it in and choose the port again.",
     driverHangs: "Or its driver hangs.",
-    noPermission: "Or you may not open it: `sudo usermod -aG dialout $USER`, then log in again.",
-    noPort: "No port was chosen. Where the list has no Uno: plug it in, by a cable that carries data and not power alone.",
+    noPermission:
+        "Or you may not open it: `sudo usermod -aG dialout $USER`, then log in again. Chromium on Ubuntu: `sudo snap connect chromium:raw-usb`.",
+    noPort: "No port was chosen. If the list has no Uno, plug it in, by a cable that carries data. Chromium on Ubuntu: `sudo snap connect chromium:raw-usb`.",
     noSerialServed:
-        "This page comes from weeder serve, which has the machines' ports itself and flashes nothing. To flash, end it and run weeder flash there, or open the page's folder on that computer.",
+        "This page comes from weeder serve, which has the ports itself and flashes nothing. To flash, end it and run weeder flash there, or open the page's folder on that computer.",
     noSerialHttp:
-        "This page came over plain http, and over that a browser gives no page a serial port. Open the page's folder on the computer that has the Uno at its USB port, or serve it by https or from localhost.",
+        "Over plain http, a browser gives a page no serial port. Open the page's folder on the computer that has the Uno, or serve it by https or from localhost.",
     noSerial:
         "This browser has no Web Serial. Chrome, Edge and Opera have it on a computer: open the page in one of them. Without one, avrdude writes the HEX, and any serial monitor at 115200 baud talks to the machine.",
 
@@ -406,7 +407,7 @@ export const heard = {
     deviceAnswers:
         "something else answers at this port: \u201c{text}\u201d. Choose the Uno's port; where it is the Uno's, choose {other}.",
     noBootloader:
-        "no bootloader answers at {baud} baud. Try {other}; pull D0 and D1 free of other devices; see that it is the Uno's port that was chosen. A board without a bootloader is given one by the Arduino IDE and a programmer.",
+        "no bootloader answers at {baud} baud. Try {other}; pull D0 and D1 free of other devices; check that the port is the Uno's. A board without a bootloader is given one by the Arduino IDE and a programmer.",
     otherIsUno: "\u201cArduino Uno\u201d or \u201cArduino Nano\u201d",
     otherIsOld: "the board with the old bootloader",
     otherChip:

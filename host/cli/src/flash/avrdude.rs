@@ -1,15 +1,21 @@
-//! Writes with avrdude: passes its messages on, and ends it if its port is gone or it falls silent.
+//! Writes with avrdude: passes its messages on, and ends it if its port is gone, it falls silent, or Ctrl-C is pressed.
+//!
+//! A part of a firmware never runs: as in the page, its first page is written last, and stops the chip until then.
+//! avrdude keeps the order of its options -U, and writes only the pages that a file has.
 
 use super::bootloader::Signature;
+use crate::ctrl_c;
 use anyhow::{Context, Result, ensure};
 use std::collections::HashSet;
 use std::fs;
 use std::io::{self, BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::atomic::Ordering;
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
 use std::thread;
 use std::time::{Duration, Instant};
+use uno::hex;
 
 /// Longest silence. avrdude waits 5 s for an answer, and then says so.
 const SILENCE: Duration = Duration::from_secs(12);
@@ -28,22 +34,47 @@ const GET_IT: &str = if cfg!(windows) {
     "`sudo apt install avrdude`, your system's package avrdude, or ./setup.sh installs it"
 };
 
-/// Writing cannot reach the bootloader.
-const WHOLE: &str = "The bootloader is not changed";
+/// Why an interruption does no harm.
+const HALF: &str = "Half a firmware does not run, and the bootloader is still there";
 
-/// Writes and verifies an Intel HEX file. Returns whether avrdude succeeded, and the chip's signature, if avrdude has
-/// printed it. Fails if avrdude is not installed, falls silent, or loses the port.
-pub fn write(image: &Path, port: &str, baud: u32) -> Result<(bool, Option<Signature>)> {
+const NO_ROOM: &str = "there is no room for a temporary file";
+
+/// Bytes of a page of flash (data sheet, table 27-13).
+const PAGE: usize = 128;
+
+/// The names and texts of the files that avrdude writes, in this order. The first one is a first page that jumps to
+/// itself (rjmp .-2): the bootloader starts at address 0.
+fn files(flash: &[u8]) -> [(&'static str, String); 3] {
+    let mut standstill = [0xFF_u8; PAGE];
+    standstill[1] = 0xCF;
+    // Whole pages, and two at least: avrdude keeps what a page had, and not every version takes an empty file.
+    let mut image = flash.to_vec();
+    image.resize(flash.len().next_multiple_of(PAGE).max(2 * PAGE), 0xFF);
+    let first = hex::text(&image[..PAGE]);
+    let rest = hex::text(&image).split_off(first.len() - hex::text(&[]).len());
+    [("standstill.hex", hex::text(&standstill)), ("rest.hex", rest), ("first.hex", first)]
+}
+
+/// Writes and verifies a firmware, so that a part of it never runs. Returns whether avrdude succeeded, and the chip's
+/// signature, if avrdude has printed it. Fails if avrdude is not installed, falls silent, loses the port, or is
+/// interrupted.
+pub fn write(flash: &[u8], port: &str, baud: u32) -> Result<(bool, Option<Signature>)> {
     // A link may stay when its port goes. On Windows a port is no file.
     let device: Option<PathBuf> = if cfg!(windows) { None } else { fs::canonicalize(port).ok() };
-    let mut avrdude = Command::new("avrdude")
-        // Each page is erased before it is written: a bootloader cannot erase the chip.
-        .args(["-c", "arduino", "-p", "atmega328p", "-D", "-b", &baud.to_string(), "-P", port])
-        .arg("-U")
-        .arg(format!("flash:w:{}:i", image.display()))
-        .stderr(Stdio::piped())
-        .spawn()
-        .with_context(|| format!("avrdude cannot be started: {GET_IT}, or flash in the page"))?;
+    // Files beside the ELF belong to the user.
+    let folder = tempfile::tempdir().context(NO_ROOM)?;
+    let mut command = Command::new("avrdude");
+    // Each page is erased before it is written: a bootloader cannot erase the chip.
+    command.args(["-c", "arduino", "-p", "atmega328p", "-D", "-b", &baud.to_string(), "-P"]);
+    // Started in the folder, it needs no path: on Windows it opens none with letters of another code page.
+    command.arg(device.as_deref().unwrap_or(Path::new(port))).current_dir(folder.path());
+    for (name, text) in files(flash) {
+        fs::write(folder.path().join(name), text).context(NO_ROOM)?;
+        command.args(["-U", &format!("flash:w:{name}:i")]);
+    }
+    let stop = ctrl_c()?;
+    let started = command.stderr(Stdio::piped()).spawn();
+    let mut avrdude = started.with_context(|| format!("avrdude cannot be started: {GET_IT}, or flash in the page"))?;
     let (heard, alive) = mpsc::channel();
     let words = avrdude.stderr.take();
     let reader = thread::spawn(move || pass_on(BufReader::new(words?), io::stderr(), &heard));
@@ -61,20 +92,22 @@ pub fn write(image: &Path, port: &str, baud: u32) -> Result<(bool, Option<Signat
             gone_at = Some(Instant::now());
         }
         let is_silent = last_word.elapsed() > SILENCE;
-        if is_silent || gone_at.is_some_and(|at| at.elapsed() > GRACE) {
+        let is_stopped = stop.load(Ordering::Relaxed);
+        if is_silent || is_stopped || gone_at.is_some_and(|at| at.elapsed() > GRACE) {
             // It may have ended at this moment.
             let _ = avrdude.kill();
             avrdude.wait().context("avrdude cannot be waited for")?;
             ensure!(
-                gone_at.is_some() || !is_silent,
-                "avrdude fell silent and was ended: plug the Uno out and in, and flash it again. {WHOLE}"
+                gone_at.is_some() || is_stopped || !is_silent,
+                "avrdude fell silent and was ended: plug the Uno out and in, and flash it again. {HALF}"
             );
             break false;
         }
     };
+    ensure!(succeeded || !stop.load(Ordering::Relaxed), "interrupted: flash it again. {HALF}");
     // Also if it is there again: avrdude had the one that is gone.
     let is_gone = gone_at.is_some() || device.is_some_and(|device| !device.exists());
-    ensure!(succeeded || !is_gone, "{port} is gone while the Uno was written: plug it in, and flash it again. {WHOLE}");
+    ensure!(succeeded || !is_gone, "{port} is gone while the Uno was written: plug it in, and flash it again. {HALF}");
     Ok((succeeded, reader.join().ok().flatten()))
 }
 
@@ -129,6 +162,18 @@ fn signature_in(line: &str) -> Option<Signature> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_first_page_stops_the_chip_until_the_others_are_written() {
+        let firmware: Vec<u8> = (0..1000_u16).map(|byte| byte as u8).collect();
+        let [standstill, rest, first] = files(&firmware).map(|(_, text)| text);
+        assert!(standstill.starts_with(":10000000FFCFFFFF") && rest.starts_with(":1000800080818283"));
+        assert_eq!(standstill.len(), first.len());
+        let whole = hex::text(&[&firmware[..], &[0xFF; 24]].concat());
+        assert_eq!(first.replace(&hex::text(&[]), "") + &rest, whole);
+        let [_, (_, rest), _] = files(&[0]);
+        assert!(rest.starts_with(":10008000FFFF"), "it is not empty");
+    }
 
     #[test]
     fn a_repeated_message_is_printed_once_and_progress_at_once() {

@@ -2,6 +2,7 @@
 
 use super::command_line::CommandLine;
 use super::pager::Pager;
+use control::alarm::Warning;
 use link::advice;
 use link::examples::Heading;
 use link::rows::{Heard, Hold, What};
@@ -80,8 +81,10 @@ pub struct RowModel {
     pub objects: VecDeque<Seen>,
     /// The canopies in keep-out zones: those of `objects` since the zones were last emptied.
     pub zones: VecDeque<Seen>,
-    /// Advice for the operator.
+    /// Advice for the operator in an alarm.
     advice: Option<String>,
+    /// The present warning of the machine.
+    warned: Option<Warning>,
     /// The message of a restart at work, until the machine works again.
     pub restarted: Option<String>,
     pub answer: Answer,
@@ -269,7 +272,9 @@ impl RowModel {
 
     /// What the operator must notice: a restart at work, and the advice for an alarm or a warning.
     pub fn advice(&self) -> Option<String> {
-        let parts: Vec<&str> = [&self.restarted, &self.advice].into_iter().flatten().map(String::as_str).collect();
+        let warned = self.warned.map(|warning| format!("warning {}: {}", warning.text(), advice::warning(warning)));
+        let parts = [self.restarted.as_ref(), self.advice.as_ref().or(warned.as_ref())];
+        let parts: Vec<&str> = parts.into_iter().flatten().map(String::as_str).collect();
         (!parts.is_empty()).then(|| parts.join("; "))
     }
 
@@ -280,6 +285,7 @@ impl RowModel {
                 self.settings = settings;
                 self.connection = Connection::Up(version);
                 self.is_known = false;
+                self.warned = None;
                 self.zones.clear();
             }
             Happening::Lost(why) => {
@@ -298,7 +304,12 @@ impl RowModel {
                 self.zones.clear();
             }
             Happening::Event(event, _) => self.take_event(event),
-            Happening::Settings(settings, _) => self.settings = settings,
+            Happening::Settings(settings, lines) => {
+                self.settings = settings;
+                // A line says what is saved only if that differs.
+                let are_saved = !lines.iter().any(|line| line.contains("saved"));
+                self.warned = self.warned.filter(|&warning| warning != Warning::SettingsOlder || !are_saved);
+            }
             Happening::Answered { refusal, .. } => {
                 self.answer = if refusal.is_some() { Answer::Refused } else { Answer::Done };
             }
@@ -332,6 +343,7 @@ impl RowModel {
     }
 
     fn take_event(&mut self, event: EventLine) {
+        self.warned = self.warned.filter(|&warning| !advice::ends(event, warning));
         match event {
             EventLine::Detection { class, position, votes, spacing, hold, .. } => {
                 // The hold includes both margins.
@@ -345,9 +357,7 @@ impl RowModel {
             }
             EventLine::Alarm { .. } => self.zones.clear(),
             EventLine::State { mode: Mode::Work } => self.restarted = None,
-            EventLine::Warning { warning } => {
-                self.advice = Some(format!("warning {}: {}", warning.text(), advice::warning(warning)));
-            }
+            EventLine::Warning { warning } => self.warned = Some(warning),
             _ => {}
         }
     }

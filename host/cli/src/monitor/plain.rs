@@ -47,8 +47,8 @@ pub fn run(rows: &Rows, are_there: &[bool], chosen: &Chosen, logs: Option<Logs>)
 #[derive(Default)]
 struct Standing {
     is_there: bool,
-    /// Commands that are not answered.
-    unanswered: usize,
+    /// Commands that are not answered. Several holds may have one answer.
+    unanswered: Vec<String>,
     /// Statuses since the last answer.
     statuses: usize,
     /// Whether it was lost with commands unanswered.
@@ -125,7 +125,7 @@ impl<'a> Talk<'a> {
     }
 
     fn is_idle(&self) -> bool {
-        self.standing.iter().all(|row| row.unanswered == 0)
+        self.standing.iter().all(|row| row.unanswered.is_empty())
     }
 
     /// The finding of the whole session.
@@ -195,7 +195,8 @@ impl<'a> Talk<'a> {
                 }
                 continue;
             }
-            (standing.unanswered, standing.statuses) = (standing.unanswered + 1, 0);
+            standing.unanswered.push(command.to_owned());
+            standing.statuses = 0;
             self.rows.command(row, command);
         }
         self.report_hold(output);
@@ -228,9 +229,9 @@ impl<'a> Talk<'a> {
                 }
             }
             What::Happened(Happening::Lost(why)) => {
-                let was_idle = standing.unanswered == 0;
+                let was_idle = standing.unanswered.is_empty();
                 standing.has_failed |= !was_idle;
-                (standing.is_there, standing.unanswered) = (false, 0);
+                (standing.is_there, standing.unanswered) = (false, Vec::new());
                 ensure!(self.chosen.are_several || was_idle && !ended, "{why}");
                 tell!("{}", self.chosen.under_name(row, why));
             }
@@ -244,14 +245,14 @@ impl<'a> Talk<'a> {
                 }
                 said = Some(line.clone());
             }
-            What::Happened(Happening::Answered { refusal, .. }) => {
-                standing.unanswered = standing.unanswered.saturating_sub(1);
+            What::Happened(Happening::Answered { command, refusal, .. }) => {
+                standing.unanswered.retain(|waiting| waiting != command);
                 if refusal.is_some() {
                     self.finding = Finding::Bad;
                 }
             }
             What::NotTyped { command, why } => {
-                standing.unanswered = standing.unanswered.saturating_sub(1);
+                standing.unanswered.retain(|waiting| waiting != command);
                 standing.has_failed = true;
                 said = Some(format!("error: `{command}` was not typed: {why}"));
             }
@@ -355,12 +356,15 @@ mod tests {
         }
     }
 
+    /// Opens the port of this board.
+    fn opener(board: &ScriptedBoard) -> Opener {
+        let port = board.clone();
+        Box::new(move || Ok(Wire::over(port.open().ok_or(LinkError::Absent("it".to_owned()))?, false)))
+    }
+
     /// A session with this board and this input.
     fn talk(board: &ScriptedBoard, input: &[&str], output: &mut impl Write) -> Result<Finding> {
-        let port = board.clone();
-        let open: Opener =
-            Box::new(move || Ok(Wire::over(port.open().ok_or(LinkError::Absent("it".to_owned()))?, false)));
-        let (rows, chosen) = only_row(open);
+        let (rows, chosen) = only_row(opener(board));
         let (sender, commands) = mpsc::sync_channel(9);
         for (number, text) in (1..).zip(input) {
             sender.send(Line { number, text: (*text).to_owned() }).unwrap();
@@ -378,6 +382,19 @@ mod tests {
             assert_eq!(ended.ok(), finding, "{kind}");
             assert_eq!(board.typed()[..3], ["events on", "get k", "hold"]);
         }
+    }
+
+    #[test]
+    fn one_answer_ends_every_hold_before_it() {
+        let (rows, chosen) = only_row(opener(&ScriptedBoard::plugged_in()));
+        let mut talk = Talk::new(&rows, &[true], &chosen, None);
+        for (number, text) in [(1, "hold"), (2, "Hold!")] {
+            talk.command(&Line { number, text: text.to_owned() }, &mut Vec::new());
+        }
+        assert!(!talk.is_idle());
+        let what = What::Happened(Happening::Answered { number: 1, command: "hold".to_owned(), refusal: None });
+        talk.take(&Heard { row: 0, at: Instant::now(), what }, false, &mut Vec::new()).unwrap();
+        assert!(talk.is_idle());
     }
 
     #[test]

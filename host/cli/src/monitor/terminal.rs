@@ -174,9 +174,11 @@ mod tests {
             assert_eq!((&*model.line.text, model.hold.is_some()), (line, true), "{code:?} comes with Esc");
         }
         // The word `hold`, typed to all rows, does the same.
-        (model.hold, model.target) = (None, None);
-        typed(&mut model, &rows, "hold\n");
-        assert!(model.hold.is_some());
+        for line in ["hold\n", "hold:\n"] {
+            (model.hold, model.target) = (None, None);
+            typed(&mut model, &rows, line);
+            assert!(model.hold.is_some(), "{line}");
+        }
     }
 
     #[test]

@@ -6,7 +6,7 @@ use frame::{say, tell};
 use link::settings::{self, Setting, name};
 use link::{ConsoleLine, EventLine, Status};
 use set_up::{SetUp, Step};
-use std::sync::mpsc::TryRecvError;
+use std::sync::mpsc::RecvTimeoutError;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -20,6 +20,9 @@ const ROLLED_TICKS: u32 = 500;
 
 /// After this time, a wait for the machine says what the encoder counts.
 const PATIENCE: Duration = Duration::from_secs(5);
+
+/// Time in which a line that was typed before comes.
+const TYPED: Duration = Duration::from_millis(20);
 
 /// From this speed on, the machine ends timed swings: 0.05 km/h, rounded up.
 const ROLLS_MM_S: u32 = 15;
@@ -71,11 +74,7 @@ impl Guide {
                     self.state.measured.take_line(&line);
                 }
                 _ => {
-                    let mut leads = Vec::new();
-                    for lead in [Setting::LeadOutMs, Setting::LeadInMs] {
-                        leads.push((lead, self.value(lead, None)?));
-                    }
-                    self.push(&leads)?;
+                    let leads = self.set(&[Setting::LeadOutMs, Setting::LeadInMs], &[])?;
                     self.state.measured.take_line(&line);
                     for (lead, ms) in leads {
                         self.state.measured.take_line(&format!("> set {} {ms}", name(lead)));
@@ -139,12 +138,12 @@ impl Guide {
         }
     }
 
-    /// Ends the step if the user has typed that. Drops any other line.
-    fn obey_typed(&self) -> Result<()> {
-        match self.typed.try_recv().as_ref().map(|typed| typed.text.trim()) {
+    /// Ends the step if the user has typed that. Drops any other line, and returns whether there was one.
+    pub(super) fn obey_typed(&self) -> Result<bool> {
+        match self.typed.recv_timeout(TYPED).as_ref().map(|typed| typed.text.trim()) {
             Ok("s") => Err(Error::msg(End::LeaveOut)),
-            Ok("q") | Err(TryRecvError::Disconnected) => Err(Error::msg(End::Stop)),
-            _ => Ok(()),
+            Ok("q") | Err(RecvTimeoutError::Disconnected) => Err(Error::msg(End::Stop)),
+            typed => Ok(typed.is_ok()),
         }
     }
 
@@ -167,10 +166,15 @@ impl Guide {
                 continue;
             }
             let question = "Roll to the other mark and stand still; the distance in mm";
-            let length = self.ask_for(question, Some(&length_mm.to_string()), |typed| Ok(typed.to_owned()))?;
-            self.stands_at(Some(from))?;
-            let command = format!("calibrate {length}");
-            let Some(answer) = self.ask(&command)? else { continue };
+            // The machine still knows the first mark after a refusal.
+            let (command, answer) = loop {
+                let length = self.ask_for(question, Some(&length_mm.to_string()), distance)?;
+                self.stands_at(Some(from))?;
+                let command = format!("calibrate {length}");
+                if let Some(answer) = self.ask(&command)? {
+                    break (command, answer);
+                }
+            };
             self.state.measured.take_line(&format!("> {command}"));
             answer.iter().for_each(|line| self.state.measured.take_line(line));
             answer.iter().try_for_each(|line| say!("  {line}"))?;
@@ -226,5 +230,26 @@ impl Guide {
         }
         tell!("  No plant has passed both beams for {} minutes.", PLANTS.as_secs() / 60);
         Err(Error::msg(End::LeaveOut))
+    }
+}
+
+/// A distance in mm, as the machine takes it: with `force` for one that does not fit the wheel.
+fn distance(typed: &str) -> Result<String, String> {
+    let length = typed.strip_suffix(" force").unwrap_or(typed);
+    let right = "the distance has to be a whole number in mm, as 10000";
+    length.parse::<u16>().map(|_| typed.to_owned()).map_err(|_| right.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_distance_is_a_whole_number_of_millimetres() {
+        for (typed, is_right) in
+            [("5000", true), ("5000 force", true), ("5 m", false), ("5\u{a0}000", false), ("start", false)]
+        {
+            assert_eq!(distance(typed).is_ok(), is_right, "{typed}");
+        }
     }
 }

@@ -4,8 +4,11 @@ use anyhow::{Context, Result};
 use comfy_table::{CellAlignment, Table};
 use field::conditions::{self, Conditions};
 use link::settings::{Setting, Settings, name};
+use mechanics::design::Design;
+use mechanics::machine::Machine;
+use mechanics::unit::{MM, SECOND};
 use set_up::circle::Arm;
-use set_up::{SetUp, Task, steps};
+use set_up::{Task, steps};
 use study::experiment::{Engine, Experiment, Total, Treatment, totals};
 use uno_run::by_the_manual::Novice;
 use uno_run::report::number_table;
@@ -64,19 +67,36 @@ fn weeded(conditions: &Conditions) -> Result<Vec<Total>> {
     Ok(totals(&experiment.run(&Engine::Native, |_| ())?))
 }
 
-/// What a machine with these settings, a tool of this width and the arm of the measurements is expected to weed. The
-/// servo's times, wheel and ground are those of the field. Fails if the simulated machine cannot have these values.
-pub fn expected(settings: &Settings, tool_width_mm: f64, measured: &SetUp) -> Result<String> {
+/// What this machine is expected to weed with these settings. Wheel, ground and straying are those of the field, and it
+/// has no sweeps. Fails if the simulated machine cannot have these values.
+pub fn expected(settings: &Settings, machine: &Machine) -> Result<String> {
+    let Machine { intra_row, swing, .. } = machine;
     let mut conditions = Conditions::load(conditions::DEFAULT)?.from_the_box();
     // A calibrated wheel: 2010 ticks a metre with this field's slip.
     if settings.get(Setting::TicksPerM) > 0 {
         conditions.set("wheel_mm", 380.0)?;
     }
-    conditions.set("machine.tool_width_mm", tool_width_mm)?;
-    conditions.set("machine.arm_mm", measured.arm.length_mm)?;
-    conditions.set("machine.arm", measured.trailing_tool_mm.map_or(0.0, |_| 1.0))?;
-    conditions.set("machine.beam_to_tool_mm", settings.get(Setting::BeamToToolMm).into())?;
-    conditions.set("machine.second_beam_mm", settings.get(Setting::SecondBeamMm).into())?;
+    let tool_width_mm = MM.value(intra_row.width);
+    let [least_ms, most_ms] = [swing.least_dead_time, swing.most_dead_time].map(|time| 1000.0 * SECOND.value(time));
+    let load = f64::from(Design::of(machine)?.servo_torque / intra_row.servo_torque);
+    let protected_mm = MM.value(swing.protected);
+    let stem_off_mm = (MM.value(swing.stem_off) - conditions.crop.sway_mm).max(0.0);
+    let mut parts = vec![
+        ("machine.sweeps_a_side", 0.0),
+        ("machine.tool_width_mm", tool_width_mm),
+        ("machine.arm_mm", MM.value(intra_row.shank_length)),
+        ("machine.arm", f64::from(swing.arm_trails)),
+        ("machine.beam_to_tool_mm", f64::from(settings.get(Setting::BeamToToolMm))),
+        ("machine.second_beam_mm", f64::from(settings.get(Setting::SecondBeamMm))),
+        ("machine.travel_ms", 750.0 * SECOND.value(swing.servo_time_60)),
+        ("machine.dead_time_ms", (least_ms + most_ms) / 2.0),
+        ("machine.dead_time_scatter_ms", (most_ms - least_ms).abs() / 2.0),
+        ("machine.load_kg_cm", load * conditions.machine.stall_kg_cm),
+    ];
+    if protected_mm > 0.0 {
+        parts.extend([("crop.protected_mm", protected_mm), ("crop.stem_off_mm", stem_off_mm)]);
+    }
+    parts.into_iter().try_for_each(|(part, value)| conditions.set(part, value))?;
     let set = steps().into_iter().flat_map(|step| step.tasks).filter_map(|task| match task {
         Task::Set(Setting::WheelMm | Setting::ServoInUs | Setting::ServoOutUs, _) => None,
         Task::Set(setting, _) => Some(setting),
@@ -88,14 +108,14 @@ pub fn expected(settings: &Settings, tool_width_mm: f64, measured: &SetUp) -> Re
     }
     // The simulated servo turns by the same angle, by its own pulses.
     let stroke_us = f64::from(settings.get(Setting::ServoInUs).abs_diff(settings.get(Setting::ServoOutUs)));
-    let simulated_us = (stroke_us * Arm::default().us_for_90 / measured.arm.us_for_90).round();
+    let simulated_us = (stroke_us * Arm::default().us_for_90 / swing.pulse_for_90).round();
     let in_us = f64::from(Setting::ServoInUs.description().default);
     conditions.set(&name(Setting::ServoOutUs), in_us + simulated_us)?;
     let totals = weeded(&conditions)?;
     let total = totals.first().context("no row was weeded")?;
     Ok(format!(
         "{:.1} % of the row's ground weeded, and {} % of the plants that the beam sees damaged, in the simulated \
-         field {} at {SPEED_KM_H} km/h, with a tool of {tool_width_mm} mm",
+         field {} at {SPEED_KM_H} km/h, with a tool of {tool_width_mm:.0} mm",
         100.0 * total.plots.weeded_share,
         total.damage_of_seen().shown(),
         conditions::DEFAULT,
@@ -105,18 +125,31 @@ pub fn expected(settings: &Settings, tool_width_mm: f64, measured: &SetUp) -> Re
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::path::Path;
 
     #[test]
-    fn with_another_arm_or_servo_the_simulated_tool_clears_the_stem_zone_too() {
+    fn with_another_arm_servo_or_stem_zone_the_simulated_machine_damages_no_plant_either() {
+        let zone = |stroke_us: u16, zone_mm, out_ms, in_ms| {
+            let pulse = [(Setting::ServoOutUs, 1500 + stroke_us), (Setting::StemZoneMm, zone_mm)];
+            [&pulse[..], &[(Setting::LeadOutMs, out_ms), (Setting::LeadInMs, in_ms)]].concat()
+        };
+        let measured = [(Setting::SecondBeamMm, 200), (Setting::TicksPerM, 2010), (Setting::MarginMm, 22)];
+        let protected = "swing.protected = \"90 mm\"\nswing.stem_off = \"20 mm\"\n";
+        let narrow = "swing.protected = \"40 mm\"\nswing.stem_off = \"5 mm\"\n";
+        let quick = "swing.servo_time_60 = \"60 ms\"\nswing.least_dead_time = \"10 ms\"\n\
+            swing.most_dead_time = \"15 ms\"\n";
         // 133 mm aside, in steps of 5 us.
-        for (length_mm, us_for_90, stroke_us) in [(350.0, 667.0, 170), (600.0, 1000.0, 145)] {
-            let leads = [(Setting::LeadOutMs, 121), (Setting::LeadInMs, 76)];
-            let zone = [(Setting::ServoOutUs, 1500 + stroke_us), (Setting::StemZoneMm, 110)];
-            let settings = rig::settings(&[leads, zone].concat());
-            let mut measured = SetUp::default();
-            measured.arm = Arm { length_mm, us_for_90 };
-            let expected = expected(&settings, 130.0, &measured).expect("it can be simulated");
-            assert!(expected.contains("and 0.0 % of the plants"), "{expected}");
+        for (width_mm, own, settings) in [
+            (130, format!("{protected}swing.pulse_for_90 = 667\n"), zone(170, 110, 121, 76)),
+            (130, format!("{protected}intra_row.shank_length = \"600 mm\"\n"), zone(145, 110, 121, 76)),
+            (100, narrow.to_owned(), zone(175, 45, 116, 63)),
+            (130, format!("{protected}{quick}"), [&zone(250, 110, 48, 10)[..], &measured].concat()),
+        ] {
+            let of_all = "intra_row.blade_height = \"2.5 mm\"\nintra_row.width";
+            let text = format!("{of_all} = \"{width_mm} mm\"\n{own}");
+            let machine = mechanics::file::parse(Path::new("my.toml"), &text).expect("it is right");
+            let expected = expected(&rig::settings(&settings), &machine).expect("it can be simulated");
+            assert!(expected.contains("and 0.0 % of the plants"), "{text}{expected}");
         }
     }
 }

@@ -78,8 +78,10 @@ pub(super) fn loss_budget(totals: &[Total]) -> Table {
 
 /// The largest loss of the row's ground.
 fn most_lost(total: &Total) -> String {
-    let (part, share) = total.plots.budget.largest_loss();
-    format!("{} {:.1}", part.key(), 100.0 * share)
+    // In the tenths of the loss budget, which add up.
+    let largest = total.plots.budget.largest_loss().0;
+    let (part, tenths) = total.plots.budget.tenths()[largest as usize];
+    format!("{} {:.1}", part.key(), f64::from(tenths) / 10.0)
 }
 
 /// The weeded share of the row's ground, and the confidence range of its mean.

@@ -43,6 +43,24 @@ fn a_trial_prints_each_controller_s_damage_and_writes_its_report() {
 }
 
 #[test]
+fn the_largest_loss_is_rounded_as_in_the_loss_budget() {
+    let folder = folder();
+    fs::write(folder.path().join("tiny.toml"), "[plot]\nrows = 1\nrow_m = 6\n").unwrap();
+    let field = ["trial", "--field", "tiny.toml", "--speeds", "1,2.5", "--spacings", "50", "--replications", "2"];
+    let words = said(folder.path(), &field);
+    let (tables, budget) = words.split_once("Loss budget").unwrap();
+    let mut found = 0;
+    for line in tables.lines().filter(|line| line.contains("this firmware")) {
+        let mut cells = line.split_whitespace().skip_while(|cell| !["plants", "margins", "swings"].contains(cell));
+        if let Some(largest) = cells.nth(1) {
+            assert!(budget.split_whitespace().any(|cell| cell == largest), "{line}\n{budget}");
+            found += 1;
+        }
+    }
+    assert_eq!(found, 2, "{tables}");
+}
+
+#[test]
 fn a_trial_s_table_can_be_evaluated_like_a_real_one() {
     let folder = folder();
     said(folder.path(), &["trial", "--field", "small.toml", "--out", "."]);

@@ -188,6 +188,17 @@ fn the_readme_s_first_screen_has_both_ways_in_to_be_copied_as_a_whole_and_the_ga
 }
 
 #[test]
+fn the_manual_and_setup_name_the_node_js_that_the_page_needs() {
+    let read = |name: &str| fs::read_to_string(Path::new(ROOT).join(name)).expect("it is there");
+    let package = read("page/package.json");
+    let (_, rest) = package.split_once("\"node\": \">=").expect("the page names its Node.js");
+    let version = rest.split('"').next().expect("it is a version");
+    for name in ["README.md", "docs/page.md", "setup.sh"] {
+        assert!(read(name).contains(&format!("Node.js {version} or later")), "{name} does not name Node.js {version}");
+    }
+}
+
+#[test]
 fn commands_in_the_manual_that_need_no_uno_work() {
     let folder = TempDir::new().expect("a folder");
     fs::create_dir_all(folder.path().join("control/src/ground/examples")).expect("a folder in it");

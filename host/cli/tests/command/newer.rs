@@ -138,7 +138,8 @@ fn settings_of_a_newer_firmware_are_pulled_compared_and_pushed() {
     let folder = tempfile::tempdir().expect("there is room for a file");
     let file = folder.path().join("machine.toml");
     let name = file.to_str().expect("it is text");
-    printed(&machine.weeder(&["settings", "pull", name], ""), 0);
+    let pulled = printed(&machine.weeder(&["settings", "pull", name], ""), 0);
+    assert!(pulled.contains("is newer than this program") && pulled.contains("the firmware lacks k"), "{pulled}");
     let text = fs::read_to_string(&file).expect("it was written");
     assert!(text.contains("wheel_mm = 900\n") && text.contains("tilt_mm = 7\n"), "{text}");
     assert!(text.contains("lamp = false\n") && !text.contains("\nk = "), "{text}");

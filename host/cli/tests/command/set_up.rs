@@ -6,7 +6,7 @@ use field::conditions::Conditions;
 use link::settings::{Setting, name};
 use set_up::{ManualStep, Task, steps};
 use std::collections::BTreeMap;
-use std::fs;
+use std::fs::{self, File};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
@@ -14,6 +14,7 @@ use std::thread;
 use std::time::Duration;
 use study::experiment::{Engine, Experiment, Total, Treatment, totals};
 use tempfile::TempDir;
+use uno::pty::Pty;
 use uno_run::by_the_manual::Novice;
 
 /// The page of the manual.
@@ -408,6 +409,37 @@ fn of_two_timings_by_eye_the_safest_times_are_set_and_one_that_is_left_out_does_
     for line in ["    lead_out_ms 190 ms\n", "    lead_in_ms 50 ms\n"] {
         assert!(second.contains(line), "{line:?} is not in\n{second}");
     }
+}
+
+#[test]
+fn a_lead_that_contradicts_the_others_is_asked_again_and_the_timing_counts() {
+    let folder = TempDir::new().expect("there is room for a folder");
+    let (_uno, _) = uno(folder.path(), &["--stand", "--fast", "--link", "uno"]);
+    let said = answered(folder.path(), &["", "s", "s", "s", "s", "s", "off", "", "450", "40", "190", "50", "q"]);
+    for words in ["together need a beam_to_tool_mm of ", "time the servo: `calibrate servo` (1 of 2 done)"] {
+        assert!(said.contains(words), "{words:?} is not in\n{said}");
+    }
+}
+
+#[test]
+fn a_line_that_is_typed_at_a_terminal_before_a_question_does_not_answer_it() {
+    let folder = TempDir::new().expect("there is room for a folder");
+    let (_uno, _) = uno(folder.path(), &["--stand", "--link", "uno"]);
+    let mut terminal = Pty::open().expect("there is a pseudo terminal");
+    let keyboard = File::open(terminal.path()).expect("it is there");
+    terminal.write(b"\n\n\n\n").expect("it has room");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
+    command.current_dir(&folder).args(["set-up", "--port", "./uno"]).stdin(keyboard).stdout(Stdio::piped());
+    let mut guide = Ends(command.spawn().expect("cargo has built the command"));
+    let (output, mut said) = (guide.0.stdout.take().expect("it is piped"), String::new());
+    for byte in BufReader::new(output).bytes() {
+        said.push(char::from(byte.expect("it can be read")));
+        if said.ends_with("]: ") {
+            terminal.write(b"q\n").expect("it has room");
+        }
+    }
+    assert_eq!(said.matches("]: ").count(), 1, "{said}");
+    assert!(said.ends_with("Stopped. The same command continues here.\n"), "{said}");
 }
 
 #[test]

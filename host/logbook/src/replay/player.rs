@@ -60,6 +60,17 @@ impl Pace {
     /// All paces, the most likely first.
     pub(super) const ALL: [Self; 3] = [Self::Even, Self::Slow, Self::Fast];
 
+    /// How much later a detection ends than in the log, in ticks, within the tolerance. The tool goes out for an
+    /// expected plant, or later for the plant's own zone if the plant is classified first. An early end and a slow pace
+    /// favour the second, a late end and a fast pace the first.
+    const fn end_later(self) -> i32 {
+        match self {
+            Self::Even => 0,
+            Self::Slow => -DETECTION_TICKS,
+            Self::Fast => DETECTION_TICKS,
+        }
+    }
+
     /// The speed after a share of the distance between two lines, in mm/s; never negative.
     fn speed(self, from: f64, to: f64, share: f64) -> f64 {
         // At constant acceleration the square of the speed is linear in the distance.
@@ -92,7 +103,7 @@ impl<'a> Player<'a> {
     /// A machine in the state at the stretch's beginning. It has rolled there from the position where watching began, if
     /// the log shows it.
     pub(super) fn new(stretch: &'a Stretch<'a>, pace: Pace) -> Self {
-        let canopies = Canopies::of(stretch);
+        let canopies = Canopies::of(stretch, pace);
         let position = stretch.began();
         let broken = canopies.over(position).is_some();
         // The log's sensors. Add another only if the log has its level; else refuse such a log in `replay_stretch`.
@@ -122,9 +133,15 @@ impl<'a> Player<'a> {
             heard: Vec::new(),
             swallows_alarm: false,
         };
+        let (is_work, is_unseen) = (stretch.first.mode == Mode::Work, stretch.first.unseen_mm > 0);
+        // On unseen ground work began where watching did.
+        if is_work && is_unseen {
+            let _ = player.rig.start(false);
+            player.rig.enable_events(true);
+        }
         player.roll_in(&stretch.first);
-        if stretch.first.mode == Mode::Work {
-            let _ = player.rig.start(stretch.first.unseen_mm <= 0);
+        if is_work && !is_unseen {
+            let _ = player.rig.start(true);
         }
         player.rig.enable_events(true);
         player
@@ -331,7 +348,7 @@ struct Canopies {
 }
 
 impl Canopies {
-    fn of(stretch: &Stretch) -> Self {
+    fn of(stretch: &Stretch, pace: Pace) -> Self {
         let (mut settings, first) = (stretch.settings.clone(), stretch.first.position);
         let mut canopies = Vec::new();
         for (number, (_, happened)) in stretch.happened.iter().enumerate() {
@@ -348,7 +365,7 @@ impl Canopies {
                     canopies.push(Canopy {
                         number,
                         from: *position,
-                        to: position.wrapping_add(width),
+                        to: position.wrapping_add(width).wrapping_add(pace.end_later()),
                         seen: Some(seen),
                     });
                 }

@@ -131,17 +131,24 @@ impl<'a> Stretch<'a> {
         })
     }
 
-    /// The first position from which the log has all inputs of the tool's swings. A machine that has just started has
-    /// no zones, and the ground that it has seen was bare.
+    /// The first position from which the log has all inputs of the tool's swings; `i32::MAX` if it never has. A machine
+    /// that has just started has no zones, and the ground that it has seen was bare. If its tool is already in the row,
+    /// the line of that swing may still follow.
     pub(super) fn compared_from(&self) -> i32 {
-        if self.first.unseen_mm > 0 && self.first.zones == 0 {
+        if self.first.unseen_mm > 0 && self.first.zones == 0 && self.first.tool_out {
             return i32::MIN;
         }
         let first = self.first.position;
         let reached = self.reached_at_first().map_or(0, |(_, end)| end.wrapping_sub(first).max(0));
         // The zone of the last canopy before.
         let zone = [Setting::BeamToToolMm, Setting::MarginMm].map(|setting| self.settings.ticks(setting).0);
-        zone.into_iter().fold(first.saturating_add(reached), i32::saturating_add)
+        let from = zone.into_iter().fold(first.saturating_add(reached), i32::saturating_add);
+        if self.settings.get(Setting::GuardSpacingMm) == 0 {
+            return from;
+        }
+        // The plant from which the machine counts is unknown until `start` forgets the ground.
+        let begun = self.happened.iter().filter_map(status).find(|begun| begun.unseen_mm > 0);
+        begun.map_or(i32::MAX, |begun| begun.position.max(from))
     }
 
     /// The machine's position at a typed command that changes no state: between its last position, with that time, and

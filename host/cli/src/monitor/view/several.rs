@@ -33,7 +33,9 @@ pub fn draw(model: &Model, rows: &[RowModel], frame: &mut Frame) {
     let counted = [vec![Span::raw(format!("{} rows: ", rows.len()))], counts(rows.iter())].concat();
     draw_top(counted.into(), frame, top);
     draw_list(model, rows, frame, list);
-    if let Some((row, text)) = rows.iter().find_map(|row| Some((row, row.advice()?))) {
+    // Another row's warning does not hide what to do about an alarm.
+    let alarmed = rows.iter().filter(|row| state(row) == ALARM);
+    if let Some((row, text)) = alarmed.chain(rows).find_map(|row| Some((row, row.advice()?))) {
         frame.render_widget(Line::styled(format!("{}: {text}", row.name), URGENT), advice);
     }
     if is_roomy {
