@@ -106,7 +106,7 @@ if [ "$page" = yes ]; then
     lock=page/node_modules/.package-lock.json
     if [ ! -e "$lock" ] || [ page/package-lock.json -nt "$lock" ]; then npm --prefix page ci --no-audit --no-fund; fi
     # All builds go into one folder, also if the user's cargo has another. These variables would replace this repository's flags.
-    CARGO_TARGET_DIR=$(realpath -m "${CARGO_TARGET_DIR:-target}")
+    [[ ${CARGO_TARGET_DIR:=target} == /* ]] || CARGO_TARGET_DIR=$PWD/$CARGO_TARGET_DIR
     export CARGO_TARGET_DIR
     unset RUSTFLAGS CARGO_ENCODED_RUSTFLAGS CARGO_BUILD_TARGET CARGO_INCREMENTAL
     cargo firmware --quiet

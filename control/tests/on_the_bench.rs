@@ -67,7 +67,8 @@ fn hold_and_the_switch_going_off_end_a_manual_test() {
     machine.hold();
     assert_eq!(machine.stand(10).pulse, out);
     machine.calibrate_servo().unwrap();
-    assert_ne!(machine.stand(10).pulse, out);
+    // After the first swing, which is out.
+    assert_ne!(machine.stand(1600).pulse, out);
     machine.hold();
     assert_eq!(machine.stand(10).pulse, out);
 
@@ -105,7 +106,8 @@ fn manual_tests_need_a_standing_machine_and_end_when_it_rolls() {
             assert_eq!(machine.servo_out(), Ok(()), "out is safe");
             assert_eq!(machine.stand(200).pulse, out);
             assert_eq!(moves(&mut machine), Ok(()), "{number}");
-            assert_ne!(machine.stand(200).pulse, out, "{number}");
+            // The first swing of `calibrate_servo` is out.
+            assert_ne!(machine.stand(if number == 2 { 1600 } else { 200 }).pulse, out, "{number}");
             // Within 4 mm of the ground.
             roll(&mut machine, if ticks_a_second > 0 { 6 } else { 25 });
             assert_eq!(machine.stand(1).pulse, out, "{number}");
@@ -160,7 +162,7 @@ fn swings(machine: &mut Machine, out_ms: u32, in_ms: u32) -> Vec<Event> {
         if machine.tool_out() != told_out {
             (told_out, told_at) = (machine.tool_out(), now);
         }
-        assert!(now >= 18_990 || machine.lamp_is_lit() == machine.tool_out(), "the LED shows the commands");
+        assert!(now >= 20_490 || machine.lamp_is_lit() == machine.tool_out(), "the LED shows the commands");
     }
     machine.events()
 }
@@ -201,7 +203,7 @@ fn without_an_end_switch_the_swings_are_shown() {
 fn timed_swings_can_be_ended() {
     let mut machine = machine();
     machine.calibrate_servo().unwrap();
-    assert_eq!(machine.stand(100).pulse, servo::from_us(1500));
+    assert_eq!(machine.stand(1600).pulse, servo::from_us(1500));
     machine.servo_out().unwrap();
     assert_eq!(machine.stand(100).pulse, servo::from_us(2000));
 }

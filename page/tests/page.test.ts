@@ -89,6 +89,7 @@ test("a fault that is made by a click takes the tool out, and its alarm shows un
 test("no control moves under the pointer while the machine drives, and into its alarm", async () => {
     for (const [screen, language] of [
         [DESK, "en"],
+        [{ width: 600, height: 900 }, "fr"],
         [PHONE, "fr"],
     ] as const) {
         const opened = await open(browser, "try", screen);

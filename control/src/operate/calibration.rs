@@ -127,8 +127,8 @@ pub struct Swings {
 }
 
 impl Swings {
-    /// Starts with a swing out of the row: the operator may have put the tool in. `watched` tells whether there is an end switch. `gap_ms` is the shortest gap between servo
-    /// pulses; 0 stands for fixed frames.
+    /// Starts with a swing out of the row: the operator may have put the tool in. `watched` tells whether there is an end switch.
+    /// `gap_ms` is the shortest gap between servo pulses; 0 stands for fixed frames.
     pub const fn new(now: Instant, watched: bool, gap_ms: u8) -> Self {
         let wait_ms = if gap_ms == 0 { FRAME_MS } else { gap_ms };
         Self {

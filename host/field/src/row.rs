@@ -141,7 +141,7 @@ pub enum Problem {
     Overlap(Box<[Canopy; 2]>),
     /// The row is too long.
     #[error(
-        "the row is {} m long, with half a spacing at either end: it has to be at most {} m",
+        "the row is {} m long, with half a spacing at its ends: it has to be at most {} m",
         (.0 / 1000.0).ceil(), MAX_LENGTH_MM / 1000.0
     )]
     Length(f64),
@@ -352,7 +352,7 @@ mod tests {
             ("18446744073709551616,150,plant\n", "row.csv, line 2: position_mm is 18446744073709552000: it has to be"),
             (
                 "-9e6,150,plant\n9e6,150,plant\n",
-                "row.csv, line 3: the row is 36000 m long, with half a spacing at either end: it has to be",
+                "row.csv, line 3: the row is 36000 m long, with half a spacing at its ends: it has to be",
             ),
             ("0,150,plant\n4e6,150,plant\n", "row.csv, line 3: the row is 8000 m long"),
             (

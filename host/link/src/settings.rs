@@ -339,10 +339,15 @@ pub fn push(
     }
     let commands = steps.iter().map(|&(setting, value)| format!("set {} {value}", name(setting)));
     for (sent, command) in commands.chain(changed.iter().map(|(_, command)| command.clone())).enumerate() {
-        let failed = |error| if sent == 0 { SettingsError::Link(error) } else { SettingsError::NotSaved(error) };
+        // A command without an answer may have been carried out.
+        let failed = |error| match error {
+            error @ LinkError::Refused { .. } if sent == 0 => SettingsError::Link(error),
+            error => SettingsError::NotSaved(error),
+        };
         link.ask(&command).map_err(failed)?;
     }
-    let found = read_shown(link)?;
+    let is_sent = !(steps.is_empty() && changed.is_empty());
+    let found = read_shown(link).map_err(if is_sent { SettingsError::NotSaved } else { SettingsError::Link })?;
     let differs = |&setting: &Setting| {
         ![&found, &shown].iter().any(|shown| shown.missing.contains(&setting))
             // A wheel of another version may have reset its calibration.

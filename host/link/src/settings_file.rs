@@ -7,7 +7,7 @@
 use super::settings::{Foreign, OtherSetting, Setting, Settings, Shown, help, name, range};
 use files::{FileError, bounded_file, whole_file};
 use std::path::Path;
-use toml_edit::{Decor, DocumentMut, Item, Key, TomlError, Value};
+use toml_edit::{Decor, DocumentMut, Item, Key, RawString, TomlError, Value};
 
 const HEAD: &str = "\
 # Settings of a weeder. `weeder settings push` sends them to the machine, `weeder settings diff` compares.
@@ -116,6 +116,26 @@ fn merge_gap_mm(ticks: u16, settings: &[(Setting, u16)]) -> u16 {
     millimetres.round().min(Setting::MergeGapMm.greatest().into()) as u16
 }
 
+/// Makes comments of the values whose key is not `kept`. They stay in their places, with their own comments.
+fn comment_out(document: &mut DocumentMut, kept: impl Fn(&str) -> bool) {
+    let text = |raw: Option<&RawString>| raw.and_then(RawString::as_str).unwrap_or_default().to_owned();
+    let mut carried = String::new();
+    let names: Vec<String> = document.iter().map(|(name, _)| name.to_owned()).collect();
+    for name in names {
+        if !kept(&name) {
+            if let Some((key, item)) = document.remove_entry(&name) {
+                let value = item.to_string().replace('\n', "\n# ");
+                carried += &format!("{}# {name} ={value}\n", text(key.leaf_decor().prefix()));
+            }
+        } else if let Some(mut key) = document.key_mut(&name) {
+            let prefix = std::mem::take(&mut carried) + &text(key.leaf_decor().prefix());
+            key.leaf_decor_mut().set_prefix(prefix);
+        }
+    }
+    let trailing = carried + &text(Some(document.trailing()));
+    document.set_trailing(trailing);
+}
+
 fn updated(path: &Path, old: &str, shown: &Shown) -> Result<String, FileError> {
     let (mut document, _) = parse(path, old)?;
     // In a file without values the comments belong to its end, and new values would go before them.
@@ -132,7 +152,7 @@ fn updated(path: &Path, old: &str, shown: &Shown) -> Result<String, FileError> {
         // Moves its comments as well.
         document.insert_formatted(&Key::new(name(Setting::MergeGapMm)).with_leaf_decor(key.leaf_decor().clone()), item);
     }
-    document.retain(|key, _| {
+    comment_out(&mut document, |key| {
         let is_known = Setting::find(key.as_bytes()).is_some_and(|setting| !shown.missing.contains(&setting));
         is_known || shown.others.iter().any(|other| other.name == key)
     });
@@ -229,12 +249,16 @@ mod tests {
     }
 
     #[test]
-    fn a_value_that_the_machine_does_not_show_leaves_the_file() {
-        let old = "k = 5 # five plants\nlead_out_ms = 999\ntilt_mm = 7\n";
+    fn a_value_that_the_machine_does_not_show_becomes_a_comment() {
+        let old = "# Field north\nwarp_mm = 7 # mine\nk = 5 # five plants\nlead_out_ms = 999\ntilt_mm = 7\n";
         let shown = Shown { missing: vec![Setting::LeadOutMs], ..Shown::default() };
         let new = updated(Path::new("machine.toml"), old, &shown).unwrap();
-        assert!(new.starts_with("k = 3 # five plants\n"), "{new}");
-        assert!(!new.contains("lead_out_ms = ") && !new.contains("tilt_mm"), "{new}");
+        let values = new.lines().filter(|line| !line.starts_with('#')).collect::<Vec<_>>().concat();
+        assert!(values.contains("k = 3 # five plants"), "{new}");
+        assert!(!values.contains("lead_out_ms") && !values.contains("tilt_mm"), "{new}");
+        for comment in ["# Field north\n# warp_mm = 7 # mine\nk = 3", "# lead_out_ms = 999\n# tilt_mm = 7\n"] {
+            assert!(new.contains(comment), "{new}");
+        }
     }
 
     #[test]

@@ -305,14 +305,16 @@ mod tests {
 
     #[test]
     fn after_plants_before_the_log_swings_for_expected_plants_are_not_compared_until_a_start() {
-        for (guard_spacing_mm, starts_at, is_compared) in [(0, 30, true), (500, 30, false), (500, 9, true)] {
+        for (guard_spacing_mm, starts_at, zones, is_compared) in
+            [(0, 30, 0, true), (500, 30, 0, false), (500, 9, 0, true), (500, 9, 1, false)]
+        {
             let mut log = log_at_work(&[(11, Kind::Event, "swing tool=out pos=1050")], |number| {
-                format!("tool=in windows=0 unseen_mm={}", if number == starts_at { 450 } else { 0 })
+                format!("tool=in windows={zones} unseen_mm={}", if number == starts_at { 450 } else { 0 })
             });
             let text = format!("guard_spacing_mm={guard_spacing_mm}");
             log.insert(1, Entry { number: 2, time_ms: 0, kind: Kind::Setting, text });
             let replayed = replay(&log).unwrap();
-            assert_eq!(replayed.difference.is_some(), is_compared, "{guard_spacing_mm} {starts_at}");
+            assert_eq!(replayed.difference.is_some(), is_compared, "{guard_spacing_mm} {starts_at} {zones}");
         }
     }
 

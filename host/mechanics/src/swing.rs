@@ -152,10 +152,10 @@ impl Swing {
         let wide_mm = if arm_margin_mm > 0.0 { f64::from(Setting::MarginMm.default()) + arm_margin_mm } else { 0.0 };
         let mut after = settings.clone();
         for (setting, value, advice) in [
-            (Setting::ServoInUs, in_us, "fit the tool at another one"),
+            (Setting::ServoInUs, in_us, "fit the tool at another pulse"),
             (Setting::ServoOutUs, out_us, "take a longer arm, or fit the tool at another servo_in_us"),
-            (Setting::LeadOutMs, lead_out_ms, "take a faster or a stronger one"),
-            (Setting::LeadInMs, lead_in_ms, "take one with a shorter dead time"),
+            (Setting::LeadOutMs, lead_out_ms, "take a faster or a stronger servo"),
+            (Setting::LeadInMs, lead_in_ms, "take a servo with a shorter dead time"),
             (Setting::MarginMm, wide_mm.max(board_mm), "take a longer arm, or a pendulum"),
         ] {
             // `as` saturates: a negative pulse becomes 0, which is out of range.
@@ -273,7 +273,8 @@ impl Swing {
             said.push(format!("The sweeps run {:.0} mm inside the {zone}: start them farther out.", -beside_mm));
         } else if self.stem_zone_mm > 0 {
             said.push(format!(
-                "The sweeps start {beside_mm:.0} mm beside the {zone}. They cut plants if the machine strays farther."
+                "The sweeps start {beside_mm:.0} mm beside the stem zone's protected part. They cut plants if machine and plants \
+                 stray farther in all."
             ));
         }
         if self.unweeded_strip_mm <= 0.0 {
@@ -421,7 +422,7 @@ mod tests {
             (
                 changed(|machine| machine.swing.servo_time_60 = SECOND.of(1.5)),
                 [1500, 2000],
-                "the swing needs lead_out_ms 883, and the firmware takes 0 to 500: take a faster or a stronger one",
+                "the swing needs lead_out_ms 883, and the firmware takes 0 to 500: take a faster or a stronger servo",
             ),
             (
                 changed(|machine| machine.swing.pulse_for_90 = 2500.0),
@@ -486,7 +487,7 @@ mod tests {
         let beside = words(|machine| {
             (machine.swing.protected, machine.swing.sweep_from) = (MM.of(90.0), MM.of(65.0));
         });
-        assert!(beside.contains("The sweeps start 20 mm beside the stem zone."), "{beside}");
+        assert!(beside.contains("The sweeps start 20 mm beside the stem zone's protected part."), "{beside}");
         assert!(words(|machine| machine.swing.sweep_from = MM.of(20.0)).contains("30 mm inside the protection zone"));
         let (usual, without) = (words(|_| ()), words(|machine| machine.inter_row.tools = 0));
         assert!(!usual.contains("alarm 3-1") && !usual.contains("The sweeps"), "{usual}");

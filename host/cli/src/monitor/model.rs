@@ -278,6 +278,11 @@ impl RowModel {
         (!parts.is_empty()).then(|| parts.join("; "))
     }
 
+    /// Whether it has restarted at work, and the operator has not acted since.
+    pub fn has_restarted(&self) -> bool {
+        self.restarted.is_some()
+    }
+
     fn update(&mut self, happening: Happening) {
         self.set_up.take(&happening);
         match happening {

@@ -154,7 +154,7 @@ impl Guide {
             // They were of another wheel.
             self.state.measured.ticks_per_m.clear();
         }
-        loop {
+        'stretches: loop {
             let stretches = self.state.measured.ticks_per_m.len();
             if stretches >= SetUp::STRETCHES {
                 return self.push(&[]);
@@ -165,10 +165,13 @@ impl Guide {
             if self.ask("calibrate start")?.is_none() {
                 continue;
             }
-            let question = "Roll to the other mark and stand still; the distance in mm";
+            let question = "Roll to the other mark and stand still; the distance in mm, or again";
             // The machine still knows the first mark after a refusal.
             let (command, answer) = loop {
                 let length = self.ask_for(question, Some(&length_mm.to_string()), distance)?;
+                if length == AGAIN {
+                    continue 'stretches;
+                }
                 self.stands_at(Some(from))?;
                 let command = format!("calibrate {length}");
                 if let Some(answer) = self.ask(&command)? {
@@ -233,11 +236,15 @@ impl Guide {
     }
 }
 
-/// A distance in mm, as the machine takes it: with `force` for one that does not fit the wheel.
+/// The answer that begins a stretch again.
+const AGAIN: &str = "again";
+
+/// A distance in mm, as the machine takes it: with `force` for one that does not fit the wheel. Or [`AGAIN`].
 fn distance(typed: &str) -> Result<String, String> {
     let length = typed.strip_suffix(" force").unwrap_or(typed);
-    let right = "the distance has to be a whole number in mm, as 10000";
-    length.parse::<u16>().map(|_| typed.to_owned()).map_err(|_| right.to_owned())
+    let is_right = typed == AGAIN || length.parse::<u16>().is_ok();
+    let right = "type a whole number in mm, as `10000` or `10000 force`, or `again` for a new stretch";
+    if is_right { Ok(typed.to_owned()) } else { Err(right.to_owned()) }
 }
 
 #[cfg(test)]
@@ -246,9 +253,14 @@ mod tests {
 
     #[test]
     fn a_distance_is_a_whole_number_of_millimetres() {
-        for (typed, is_right) in
-            [("5000", true), ("5000 force", true), ("5 m", false), ("5\u{a0}000", false), ("start", false)]
-        {
+        for (typed, is_right) in [
+            ("5000", true),
+            ("5000 force", true),
+            ("again", true),
+            ("5 m", false),
+            ("5\u{a0}000", false),
+            ("start", false),
+        ] {
             assert_eq!(distance(typed).is_ok(), is_right, "{typed}");
         }
     }

@@ -115,7 +115,8 @@ pub fn expected(settings: &Settings, machine: &Machine) -> Result<String> {
     let total = totals.first().context("no row was weeded")?;
     Ok(format!(
         "{:.1} % of the row's ground weeded, and {} % of the plants that the beam sees damaged, in the simulated \
-         field {} at {SPEED_KM_H} km/h, with a tool of {tool_width_mm:.0} mm",
+         field {} at {SPEED_KM_H} km/h, with a tool of {tool_width_mm:.0} mm and no \
+         sweeps",
         100.0 * total.plots.weeded_share,
         total.damage_of_seen().shown(),
         conditions::DEFAULT,

@@ -102,7 +102,7 @@ fn a_row_that_no_machine_can_roll_along_is_refused_with_its_line() {
     std::fs::write(&row, "position_mm,width_mm,kind\n-9e6,150,plant\n9e6,150,plant\n").unwrap();
     assert_refused(
         &["sim", "--row", row.to_str().unwrap()],
-        "line 3: the row is 36000 m long, with half a spacing at either end: it has to be at most 6000 m",
+        "line 3: the row is 36000 m long, with half a spacing at its ends: it has to be at most 6000 m",
     );
 }
 

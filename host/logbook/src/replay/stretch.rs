@@ -147,7 +147,7 @@ impl<'a> Stretch<'a> {
             return from;
         }
         // The plant from which the machine counts is unknown until `start` forgets the ground.
-        let begun = self.happened.iter().filter_map(status).find(|begun| begun.unseen_mm > 0);
+        let begun = self.happened.iter().filter_map(status).find(|begun| begun.unseen_mm > 0 && begun.zones == 0);
         begun.map_or(i32::MAX, |begun| begun.position.max(from))
     }
 

@@ -18,7 +18,8 @@ Weeding efficiency is of the weeds that were counted: over a whole plot it is hi
 A treatment's damage is of all its plants together. Behind it stands its exact 95 % interval: two-sided where it has two
 ends, one-sided where it reads below or above. It takes plants as independent: where plots scatter by more than counting,
 it is too narrow.
-Behind weeding stands the two-sided 95 % interval of a mean of plots. The number of plots follows if it is smaller.
+Behind weeding stands the two-sided 95 % interval of a mean of plots. If some plots were not counted,
+the number of the others follows.
 ";
 
 /// Columns of [`Analysis::plots`] that stand in the trial's own table already.

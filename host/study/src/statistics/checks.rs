@@ -21,7 +21,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT}
 /// A coefficient counts as an effect, and a check has a finding, if the p-value is below this.
 pub(crate) const SIGNIFICANCE: f64 = 0.05;
 
-/// Residual degrees of freedom that the test for unequal scatter needs. From here on, 3 to 6 of 100 simulated trials with
+/// Residual degrees of freedom that the test for unequal scatter needs. From here on, 3 to 7 of 100 simulated trials with
 /// even, normal scatter have a finding. With fewer, between none and all of them have one: 100 of 100 with 4 plots.
 const LEAST_FREEDOM: usize = 7;
 

@@ -112,7 +112,7 @@ pub enum NoModel {
     #[error("speed and spacing change together, so their effects cannot be separated")]
     Inseparable,
     /// Nothing counts: no plant as damaged, or no weed as gone.
-    #[error("the count is 0 in every plot: speed and spacing explain nothing")]
+    #[error("no plant of any plot is damaged, or no weed gone: speed and spacing explain nothing")]
     NothingCounted,
     /// A binomial model's slope diverges.
     #[error("all that was counted lies on one side of the speeds or spacings, so the odds have no finite slope")]

@@ -33,9 +33,9 @@ pub fn draw(model: &Model, rows: &[RowModel], frame: &mut Frame) {
     let counted = [vec![Span::raw(format!("{} rows: ", rows.len()))], counts(rows.iter())].concat();
     draw_top(counted.into(), frame, top);
     draw_list(model, rows, frame, list);
-    // Another row's warning does not hide what to do about an alarm.
-    let alarmed = rows.iter().filter(|row| state(row) == ALARM);
-    if let Some((row, text)) = alarmed.chain(rows).find_map(|row| Some((row, row.advice()?))) {
+    // Another row's warning hides neither what to do about an alarm nor a restart.
+    let urgent = rows.iter().filter(|row| state(row) == ALARM || row.has_restarted());
+    if let Some((row, text)) = urgent.chain(rows).find_map(|row| Some((row, row.advice()?))) {
         frame.render_widget(Line::styled(format!("{}: {text}", row.name), URGENT), advice);
     }
     if is_roomy {
