@@ -34,8 +34,8 @@ pub fn read(path: &Path) -> Result<Named, FileError> {
     parse(path, &bounded_file::text(path)?).map(|(_, named)| named)
 }
 
-/// Writes all settings of a machine into a file, also those that only the machine knows. An existing file keeps its
-/// comments, loses settings that the machine does not show, and must be a settings file.
+/// Writes all settings of a machine into a file, also those that only the machine knows. An existing file must be a
+/// settings file. It keeps its comments, and settings that the machine does not show become comments.
 ///
 /// # Errors
 /// As [`read`], and if the file cannot be written.

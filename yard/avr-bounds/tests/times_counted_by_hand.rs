@@ -208,7 +208,7 @@ fn a_bound_of_a_function_holds_for_each_of_its_loops_unless_a_record_is_at_one()
     assert_eq!(cycles(nested, &[9]), Some(11 + 9 * (1 + 29 + 3) + (1 + 29 + 2)));
     // The same, with another number for the loop within: three of its turns with their way out.
     assert_eq!(cycles(nested, &[9, 3]), Some(11 + 9 * (1 + 11 + 3) + (1 + 11 + 2)));
-    // Eight turns are counted, whatever a smaller number says; the last one's way out is 1 shorter.
+    // Eight turns are counted, and a smaller number does not lower them. The last one's way out is 1 shorter.
     assert_eq!(cycles("3: dec r24\n brne 3b\n", &[5]), Some(11 + 8 * 3 - 1));
 }
 
