@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes a release: a folder for users without Rust, independent of the build machine.
+# Makes a release: a folder for users without Rust, independent of the build machine. Runs on Debian and Ubuntu.
 #
 #     ./release.sh FOLDER             for computers like this one
 #     ./release.sh FOLDER SYSTEM      for x86_64-pc-windows-gnu or aarch64-unknown-linux-gnu; `./setup.sh page cross` installs
@@ -45,6 +45,12 @@ case "$system" in
 esac
 if [ -e "$1" ]; then
     echo "release.sh: $1 exists. Remove it, or name another folder." >&2
+    exit 1
+fi
+# GNU tools and Debian's folders are used below.
+optiboot=/usr/share/arduino/hardware/arduino/avr/bootloaders/optiboot/optiboot.c
+if [ ! -e "$optiboot" ]; then
+    echo "release.sh: there is no $optiboot. Use Debian or Ubuntu, and run ./setup.sh page first." >&2
     exit 1
 fi
 mkdir -p "$(dirname "$1")"
@@ -109,10 +115,9 @@ for name in weeder-firmware knn-bench tester-firmware; do
 done
 cp budgets.toml "$inside/"
 cp yard/tester/budgets.toml "$inside/yard/tester/"
-# As in yard/virtual-uno/src/hex.rs.
+# As in yard/virtual-uno/src/bootloader.rs.
 avr-gcc -mmcu=atmega328p -DF_CPU=16000000L -DBAUD_RATE=115200 -w -Os -mrelax -nostdlib -fno-split-wide-types \
-    -fno-inline-small-functions -nostartfiles -Wl,--section-start=.text=0x7e00 -o "$inside/optiboot.elf" \
-    /usr/share/arduino/hardware/arduino/avr/bootloaders/optiboot/optiboot.c
+    -fno-inline-small-functions -nostartfiles -Wl,--section-start=.text=0x7e00 -o "$inside/optiboot.elf" "$optiboot"
 avr-objcopy -O ihex -j .text "$inside/optiboot.elf" "$inside/optiboot.hex"
 "$weeder" hex --elf "$inside/weeder-firmware.elf" "$inside/weeder.hex"
 cmp "$inside/weeder.hex" "$folder/weeder.hex"

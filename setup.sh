@@ -75,6 +75,7 @@ if command -v dpkg-query >/dev/null; then
 else
     echo "Packages: this is neither Debian nor Ubuntu. Install your system's versions of:"
     printf '    %s\n' "${packages[@]}"
+    echo "libelf is linked from libelf.a. On Fedora, the package elfutils-libelf-devel-static has it."
 fi
 
 if ! command -v rustup >/dev/null; then

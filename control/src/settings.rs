@@ -9,19 +9,6 @@ use crate::{
     units::{Speed, Ticks, Wheel},
 };
 
-/// A setting's numbers in the table.
-#[derive(Clone, Copy)]
-pub struct Description {
-    /// Least value.
-    pub least: u16,
-    /// Greatest value.
-    pub greatest: u16,
-    /// Factory setting.
-    pub default: u16,
-    /// Whether it changes where the tool is. Then it can be set in HOLD only.
-    pub hold_only: bool,
-}
-
 /// The one table. Everything else about the settings comes from it.
 macro_rules! settings {
     ($($(#[$doc:meta])* $Variant:ident $name:literal $(in $unit:literal)?: $least:literal to $greatest:literal, $default:literal, $hold_only:literal, $help:literal;)*) => {
@@ -157,12 +144,6 @@ impl Setting {
         matches!(self, Self::WheelMm | Self::TicksPerRev)
     }
 
-    /// Its numbers in the table.
-    pub fn description(self) -> Description {
-        let (least, greatest, default) = (self.least(), self.greatest(), self.default());
-        Description { least, greatest, default, hold_only: self.is_hold_only() }
-    }
-
     /// Its least value.
     pub fn least(self) -> u16 {
         self.number(0)
@@ -184,7 +165,7 @@ impl Setting {
         self.number(2)
     }
 
-    /// Whether it can be set in HOLD only.
+    /// Whether it changes where the tool is. Then it can be set in HOLD only.
     pub fn is_hold_only(self) -> bool {
         self.number(1) & HOLD_ONLY != 0
     }

@@ -12,74 +12,42 @@ use core::{
     ops::{Add, Neg, Sub},
 };
 
-/// A position on the ground: ticks forward since power-up, wrapping.
-///
-/// No `Ord`: the sign of the distance between two positions gives their order.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Position(i32);
-
-impl Position {
-    /// The position at a count of the encoder.
-    pub const fn new(count: i32) -> Self {
-        Self(count)
-    }
-
-    /// The encoder's count at this position.
-    pub const fn count(self) -> i32 {
-        self.0
-    }
-
-    /// Whether this position lies ahead of `other`.
-    pub fn is_ahead_of(self, other: Self) -> bool {
-        (self - other).0 > 0
-    }
-}
-
-/// A distance of the odometer in ticks, positive forward.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Ticks(pub i32);
-
-impl Ticks {
-    /// No distance.
-    pub const ZERO: Self = Self(0);
-}
-
-/// A position on remembered ground, in units of a [`LengthScale`], wrapping.
-///
-/// No `Ord`: the sign of the distance between two positions gives their order.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct WrappedPosition(i16);
-
-impl WrappedPosition {
-    /// The position at a count of units.
-    pub const fn new(count: i16) -> Self {
-        Self(count)
-    }
-
-    /// The count at this position.
-    pub const fn count(self) -> i16 {
-        self.0
-    }
-
-    /// Whether this position lies ahead of `other`.
-    #[cfg_attr(target_arch = "avr", inline(never))]
-    pub fn is_ahead_of(self, other: Self) -> bool {
-        (self - other).0 > 0
-    }
-}
-
-/// A distance on remembered ground, in units of a [`LengthScale`], positive forward.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Length(pub i16);
-
-impl Length {
-    /// No distance.
-    pub const ZERO: Self = Self(0);
-}
-
-/// Wrapping sums and differences of a point type and its distance type.
+/// A type of points and the type of their distances, with wrapping sums and differences.
 macro_rules! points_and_distances {
-    ($($Point:ident $Distance:ident;)*) => {$(
+    ($($(#[$doc:meta])* $Point:ident, $(#[$of_distance:meta])* $Distance:ident: $int:ty $(, $attribute:meta)?;)*) => {$(
+        $(#[$doc])*
+        ///
+        /// No `Ord`: the sign of the distance between two positions gives their order.
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+        pub struct $Point($int);
+
+        impl $Point {
+            /// The position at a count.
+            pub const fn new(count: $int) -> Self {
+                Self(count)
+            }
+
+            /// The count at this position.
+            pub const fn count(self) -> $int {
+                self.0
+            }
+
+            /// Whether this position lies ahead of `other`.
+            $(#[$attribute])?
+            pub fn is_ahead_of(self, other: Self) -> bool {
+                (self - other).0 > 0
+            }
+        }
+
+        $(#[$of_distance])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+        pub struct $Distance(pub $int);
+
+        impl $Distance {
+            /// No distance.
+            pub const ZERO: Self = Self(0);
+        }
+
         impl Sub for $Point {
             type Output = $Distance;
             fn sub(self, from: Self) -> $Distance {
@@ -125,8 +93,14 @@ macro_rules! points_and_distances {
 }
 
 points_and_distances! {
-    Position Ticks;
-    WrappedPosition Length;
+    /// A position on the ground: ticks forward since power-up, wrapping.
+    Position,
+    /// A distance of the odometer in ticks, positive forward.
+    Ticks: i32;
+    /// A position on remembered ground, in units of a [`LengthScale`], wrapping.
+    WrappedPosition,
+    /// A distance on remembered ground, in units of a [`LengthScale`], positive forward.
+    Length: i16, cfg_attr(target_arch = "avr", inline(never));
 }
 
 /// Ticks in a unit of remembered ground, a power of two: 1 for a wheel of up to [`LengthScale::FINEST`] ticks a metre.

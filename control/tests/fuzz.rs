@@ -109,9 +109,8 @@ fn settings(changes: &[(u8, u16)]) -> Settings {
     let mut settings = Settings::new();
     for &(place, value) in changes {
         let setting = Setting::from_index(place % Setting::COUNT).expect("a place in the table");
-        let range = setting.description();
-        let width = u32::from(range.greatest - range.least) + 1;
-        let value = range.least + (u32::from(value) % width) as u16;
+        let width = u32::from(setting.greatest() - setting.least()) + 1;
+        let value = setting.least() + (u32::from(value) % width) as u16;
         settings.set(setting, value).expect("within the range");
     }
     settings
@@ -158,8 +157,7 @@ fn with_any_eeprom_the_machine_starts_with_valid_settings_or_an_alarm() {
         assert!(machine.tool_out());
         assert_eq!(machine.settings(), &found.clone().unwrap_or_default());
         for setting in Setting::all() {
-            let range = setting.description();
-            assert!((range.least..=range.greatest).contains(&machine.settings().get(setting)), "{}", setting as u8);
+            assert!(setting.allows(machine.settings().get(setting)), "{}", setting as u8);
         }
         if eeprom.spoiled.is_empty()
             && let Some(last) = eeprom.saved.last()

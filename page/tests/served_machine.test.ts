@@ -208,26 +208,12 @@ test("a machine that is lost at work weeds on, also when its absence is told aga
 test("a page that comes later shows a warning too, until it ends", () => {
     const shown = new Machine();
     machine.onHappening = (happening) => shown.take(happening, 0);
-    for (const [name, end] of [
-        ["no_plants", "unknown pos=9 votes=0 spacing=8 delay=7 hold=3 actuation=10"],
-        ["no_plants", "state is=work"],
-        ["late_command", "state is=hold"],
-    ] as const) {
-        machine.tell({ ...THERE, warning: `warning name=${name}` });
-        assert.equal(shown.warning, name);
-        machine.tell({ is: "event", said: end });
-        assert.equal(shown.warning, undefined, `${name} ${end}`);
-    }
-    machine.tell({ ...THERE, warning: "warning name=settings_older" });
-    machine.tell({ is: "event", said: "state is=hold" });
-    for (const [saved, warning] of [
-        [", saved 3", "settings_older"],
-        [", not saved", "settings_older"],
-        ["", undefined],
-    ] as const) {
-        machine.tell({ is: "settings", said: [`k=5 from 1 to 15, default 3${saved}`] });
-        assert.equal(shown.warning, warning, saved);
-    }
+    machine.tell({ ...THERE, warning: "no_plants" });
+    assert.equal(shown.warning, "no_plants");
+    machine.tell({ is: "warning", said: "late_command" });
+    assert.equal(shown.warning, "late_command");
+    machine.tell({ is: "warning", said: null });
+    assert.equal(shown.warning, undefined);
     machine.tell({ ...THERE, warning: null });
     assert.equal(shown.warning, undefined);
 });

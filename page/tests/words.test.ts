@@ -118,6 +118,10 @@ test("the page has no text that is not in the tables", () => {
 test("what weeder serve and the project's Rust say in English is known by the tables", () => {
     for (const [path, text] of [
         ["../host/link/src/error.rs", en.heard.servedGone],
+        ["../host/link/src/error.rs", en.heard.noText],
+        ["../host/link/src/error.rs", en.heard.nothingAnswers],
+        ["../host/link/src/error.rs", en.heard.otherDevice.replace('"{text}"', "{0:?}")],
+        ["../host/serve/src/hub.rs", en.heard.waitingForMachine],
         ["../host/link/src/error.rs", en.heard.unanswered],
         ["../host/link/src/session.rs", en.heard.wasReset],
         ["../host/serve/src/machine.rs", en.heard.servedNoAnswer],

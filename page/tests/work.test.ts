@@ -246,7 +246,7 @@ test("a machine at work is not flashed, and one that is disconnected at work wee
 test("a device that is no weeder is told by what it says, and the port is let go of", async () => {
     const opened = await connect(new Foreign(() => [], "$GPGGA,123519,4807.038,N\r\n"));
     await part(opened.page, "why")
-        .filter({ hasText: "It is not the weeder's firmware that answers, but \u201c$GPGGA" })
+        .filter({ hasText: "It is not the weeder's firmware that answers, but \"$GPGGA" })
         .waitFor();
     await opened.page.getByRole("button", { name: "Connect an Uno" }).waitFor();
     await close(opened);

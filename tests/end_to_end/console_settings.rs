@@ -1,7 +1,7 @@
 //! Every setting over the console: its range, values out of range, and changes while the machine works.
 
 use crate::common::{ask, refusal, run_for_ms, started};
-use control::settings::{Description, Setting};
+use control::settings::Setting;
 use uno::Uno;
 
 /// Every setting with its name.
@@ -45,7 +45,7 @@ fn get_lists_every_setting_with_value_unit_range_and_default() {
     let listed = ask(&mut started(), "get");
     let expected: Vec<String> = settings()
         .map(|(setting, name)| {
-            let Description { least, greatest, default, .. } = setting.description();
+            let (least, greatest, default) = (setting.least(), setting.greatest(), setting.default());
             let default = written(setting, default);
             let range =
                 if setting.is_switched() { "on or off".to_owned() } else { format!("from {least} to {greatest}") };
@@ -60,7 +60,7 @@ fn get_lists_every_setting_with_value_unit_range_and_default() {
 fn every_setting_takes_the_ends_of_its_range() {
     let mut uno = easily_set();
     for (setting, name) in settings() {
-        let Description { least, greatest, .. } = setting.description();
+        let (least, greatest) = (setting.least(), setting.greatest());
         let before = get(&mut uno, &name);
         for value in [written(setting, least), written(setting, greatest), before] {
             assert_eq!(ask(&mut uno, &format!("set {name} {value}")), [""; 0]);
@@ -73,7 +73,7 @@ fn every_setting_takes_the_ends_of_its_range() {
 fn every_setting_refuses_values_beyond_its_range_and_keeps_its_value() {
     let mut uno = started();
     for (setting, name) in settings() {
-        let Description { least, greatest, default, .. } = setting.description();
+        let (least, greatest, default) = (setting.least(), setting.greatest(), setting.default());
         let below = i32::from(least) - 1;
         let above = i32::from(greatest) + 1;
         let right = match setting.is_switched() {
@@ -106,9 +106,8 @@ fn settings_that_change_where_the_tool_is_are_refused_while_the_machine_works() 
     ask(&mut uno, "start");
     let mut refused = Vec::new();
     for (setting, name) in settings() {
-        let Description { least, hold_only, .. } = setting.description();
-        let least = written(setting, least);
-        if hold_only {
+        let least = written(setting, setting.least());
+        if setting.is_hold_only() {
             let before = get(&mut uno, &name);
             let answer = refusal(&mut uno, &format!("set {name} {least}"));
             assert!(answer.contains(&name) && answer.contains("hold first"), "{answer}");
@@ -137,7 +136,7 @@ fn settings_that_change_where_the_tool_is_are_refused_while_the_machine_works() 
     for name in refused {
         let (setting, _) = settings().find(|(_, other)| *other == name).expect("a setting");
         // One above the least: the two servo pulses must differ.
-        let value = setting.description().least + u16::from(name == "servo_out_us");
+        let value = setting.least() + u16::from(name == "servo_out_us");
         ask(&mut uno, &format!("set {name} {value}"));
     }
 }

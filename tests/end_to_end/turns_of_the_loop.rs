@@ -110,14 +110,16 @@ fn lines() -> Vec<String> {
         format!("{word} end_switch end_switch end_switch")
     }));
     for setting in Setting::all() {
-        let (name, range) = (name(setting), setting.description());
+        let name = name(setting);
         lines.extend([
             format!("help {name}"),
             format!("get {name}"),
             format!("set {name} x"),
             format!("set {name} 65535"),
         ]);
-        lines.extend([range.least, range.greatest, range.default].map(|value| format!("set {name} {value}")));
+        lines.extend(
+            [setting.least(), setting.greatest(), setting.default()].map(|value| format!("set {name} {value}")),
+        );
     }
     lines.push("defaults".to_owned());
     // Lines of every length, and one that is too long.

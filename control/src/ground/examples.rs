@@ -140,7 +140,7 @@ mod tests {
 
     #[test]
     fn the_default_k_is_the_k_of_the_training() {
-        assert_eq!(Setting::K.description().default, u16::from(K));
+        assert_eq!(Setting::K.default(), u16::from(K));
     }
 
     #[test]

@@ -97,7 +97,7 @@ impl Change {
         let of_field = |name: &str| {
             let parameter = field.values().find(|(known, _)| known.name == name).map(|(_, value)| value);
             let set = || field.settings.get(name).map(|&value| f64::from(value));
-            let default = || Setting::find(name.as_bytes()).map(|setting| f64::from(setting.description().default));
+            let default = || Setting::find(name.as_bytes()).map(|setting| f64::from(setting.default()));
             parameter.or_else(set).or_else(default).map_or_else(String::new, |value| written(name, value))
         };
         [

@@ -203,7 +203,7 @@ impl Guide {
     fn summary(&mut self, steps: &[ManualStep]) -> Result<()> {
         let settings = settings::read(&mut self.link)?;
         say!("\nSummary\n  Set and saved:")?;
-        for setting in Setting::all().filter(|&setting| settings.get(setting) != setting.description().default) {
+        for setting in Setting::all().filter(|&setting| settings.get(setting) != setting.default()) {
             say!("    {} {} {}", name(setting), settings.get(setting), unit(setting))?;
         }
         for ManualStep { number, title, tasks, .. } in steps {
@@ -405,14 +405,13 @@ impl Guide {
     /// Asks for a setting's value. Enter takes the offered one, or else the present one.
     fn value(&mut self, setting: Setting, offered: Option<u16>) -> Result<u16> {
         let now = settings::read(&mut self.link)?.get(setting);
-        let range_of = setting.description();
         let mut question = format!("{} in {}", name(setting), unit(setting));
         if offered.is_some_and(|offered| offered != now) {
             question += &format!(", now {now}");
         }
         let shown = offered.unwrap_or(now).to_string();
         self.ask_for(&question, Some(&shown), |typed| {
-            let value = typed.parse().ok().filter(|value| (range_of.least..=range_of.greatest).contains(value));
+            let value = typed.parse().ok().filter(|value| setting.allows(*value));
             value.ok_or_else(|| format!("{} has to be a whole number, {}", name(setting), range(setting)))
         })
     }

@@ -58,8 +58,7 @@ fn axes() -> Vec<[String; 3]> {
     let spacing = line("spacing", SPACINGS_CM.0, SPACINGS_CM.1, "plant spacing in cm");
     let parameters = PARAMETERS.iter().map(|known| line(known.name, known.least, known.greatest, known.meaning));
     let settings = Setting::all().map(|setting| {
-        let range = setting.description();
-        line(&settings::name(setting), range.least.into(), range.greatest.into(), &settings::help(setting))
+        line(&settings::name(setting), setting.least().into(), setting.greatest().into(), &settings::help(setting))
     });
     [speed, spacing].into_iter().chain(parameters).chain(settings).collect()
 }

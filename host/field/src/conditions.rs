@@ -250,8 +250,7 @@ fn explain(text: &str, byte: usize, error: &toml::de::Error) -> String {
 fn range(name: &str) -> Option<(f64, f64, String)> {
     if let Some(key) = name.strip_prefix("settings.") {
         let setting = Setting::find(key.as_bytes())?;
-        let range = setting.description();
-        return Some((range.least.into(), range.greatest.into(), setting.help().to_string()));
+        return Some((setting.least().into(), setting.greatest().into(), setting.help().to_string()));
     }
     let parameter = PARAMETERS.iter().find(|known| known.name == name)?;
     Some((parameter.least, parameter.greatest, parameter.meaning.to_owned()))

@@ -173,7 +173,7 @@ impl Conditions {
 
     /// The firmware's margin, leads and stem zone.
     pub fn timing(&self) -> Timing {
-        let of = |setting: Setting| self.setting_or(setting, setting.description().default.into()) as u32;
+        let of = |setting: Setting| self.setting_or(setting, setting.default().into()) as u32;
         Timing {
             margin_mm: of(Setting::MarginMm),
             lead_out_ms: of(Setting::LeadOutMs),

@@ -1,6 +1,5 @@
 //! Short advice to the operator for each alarm and warning. A test compares it with docs/faults.md.
 
-use super::{EventLine, Mode};
 use control::alarm::{Alarm, Warning};
 
 /// An alarm's name as used everywhere: the digits that the LED blinks, and the word, such as `3-1 too_fast`.
@@ -43,15 +42,6 @@ pub fn warning(warning: Warning) -> &'static str {
         Warning::NoPlants => "see whether the beam is as high as the canopy, and clean",
         Warning::SettingsOlder => "compare `get` with your notes, set what differs, `save`",
         Warning::SlipUnknown => "plants too near for these beams: a smaller `second_beam_mm`, or a wider margin",
-    }
-}
-
-/// Whether an event ends a warning, as in page/src/panel/machine.ts. `SettingsOlder` ends when all settings are saved.
-pub fn ends(event: EventLine, warning: Warning) -> bool {
-    match event {
-        EventLine::State { mode: Mode::Hold } => warning != Warning::SettingsOlder,
-        EventLine::State { .. } | EventLine::Detection { .. } => warning == Warning::NoPlants,
-        _ => false,
     }
 }
 

@@ -16,7 +16,7 @@ pub fn complete(line: &str) -> Vec<String> {
             if let Some(setting) = Setting::find(setting.as_bytes())
                 && !setting.is_switched() =>
         {
-            vec![setting.description().default.to_string()]
+            vec![setting.default().to_string()]
         }
         _ => {
             let arguments = (0..).map_while(Argument::from_index).map(|argument| argument.text().to_string());

@@ -48,10 +48,7 @@ pub enum LinkError {
     NotOpened { port: String, source: serialport::Error },
     #[error("the port is gone: plug the Uno in again")]
     Gone(#[source] io::Error),
-    #[error(
-        "the answer to `{command}` has no end: press the Uno's reset, and check that the weeder's firmware is on it \
-         (`weeder flash`); it sent {received:?}"
-    )]
+    #[error("{}", silent(.command, .received))]
     Silent {
         command: String,
         /// The end of what came.
@@ -59,9 +56,9 @@ pub enum LinkError {
     },
     #[error("no answer to `{command}` for {seconds} s: see to the Uno's cable and supply")]
     Unanswered { command: String, seconds: u64 },
-    #[error("the port sends no text: check that nothing else is wired to D0 and D1, and flash the Uno again")]
+    #[error("this port sends no text: choose another; on an Uno check that D0 and D1 are free, and flash it again")]
     Noise,
-    #[error("it is not the weeder's firmware that answers, but {0:?}: put it on the Uno by `weeder flash`")]
+    #[error("it is not the weeder's firmware that answers, but {0:?}: choose another port, or flash this one")]
     NotTheWeeder(String),
     #[error("the Uno was reset while it was asked `{0}`: see to its supply, then try again")]
     Restarted(String),
@@ -80,6 +77,14 @@ impl LinkError {
     pub(crate) fn is_of_an_answer(&self) -> bool {
         matches!(self, Self::Silent { .. } | Self::NotTheWeeder(_) | Self::Restarted(_) | Self::Refused { .. })
     }
+}
+
+fn silent(command: &str, received: &str) -> String {
+    if received.is_empty() {
+        return "nothing answers at this port: choose another, or press the Uno's reset; flash a new board first"
+            .to_owned();
+    }
+    format!("the answer to `{command}` has no end: press the Uno's reset, then try again; it sent {received:?}")
 }
 
 /// The other ports, for the message that none of them is an Uno's.

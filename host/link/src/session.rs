@@ -29,10 +29,12 @@ mod introduction;
 pub use self::happening::{Happening, Turn, Unanswered};
 pub(crate) use self::introduction::silence;
 
+use self::happening::UNTIL_HOLD;
 use self::introduction::{INTRODUCTION, Introduction};
 use super::moment::Moment;
 use super::settings::Shown;
 use super::{ConsoleLine, EventLine, LineReader, LinkError, Mode, Status, is_command};
+use control::alarm::Warning;
 use control::say::command::Action;
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
@@ -140,6 +142,8 @@ pub struct Session {
     is_silent: bool,
     /// Whether the machine was at work, as far as it has told.
     is_at_work: bool,
+    /// The present warning.
+    warning: Option<Warning>,
     /// Whether the reason for the missing machine was reported.
     is_loss_told: bool,
     failure: Option<LinkError>,
@@ -416,9 +420,24 @@ impl Session {
             _ => {}
         }
         match self.state {
-            State::Ready => self.turn.happened.push(happening),
+            State::Ready => {
+                let warning = happening.warning_after(self.warning);
+                self.turn.happened.push(happening);
+                self.warn(warning);
+            }
             State::Asking(_) => self.introduction.early.push(happening),
             State::Closed | State::Starting { .. } | State::Settling { .. } => {}
+        }
+    }
+
+    /// Takes the warning that the answer to `status` names.
+    fn take_named(&mut self, named: Option<Warning>) {
+        self.warn(self.warning.filter(|warning| UNTIL_HOLD.contains(warning)).or(named));
+    }
+
+    fn warn(&mut self, warning: Option<Warning>) {
+        if std::mem::replace(&mut self.warning, warning) != warning {
+            self.turn.happened.push(Happening::Warning(warning));
         }
     }
 
@@ -434,6 +453,9 @@ impl Session {
             // At once, not at the answer's end: a log and a map take the machine's position from it.
             ConsoleLine::Status(status) if is_own && self.state == State::Ready => {
                 return self.report(Happening::Status(status, line));
+            }
+            ConsoleLine::Counts(counts) if is_own && self.state == State::Ready => {
+                return self.take_named(counts.warning);
             }
             _ => return asked.answer.extend(is_own.then_some(line)),
         };

@@ -108,8 +108,9 @@ fn a_refusal_is_an_error_with_the_firmware_s_words() {
 fn silence_noise_and_another_firmware_are_given_up() {
     let noise: Vec<u8> = (0..=255).filter(|&byte| byte != b'\n' && byte != b'\r').cycle().take(60_000).collect();
     for (resets, answer, problem) in [
-        (true, Vec::new(), "`weeder flash`"),
-        (false, noise, "the port sends no text"),
+        (true, Vec::new(), "nothing answers at this port"),
+        (false, noise, "this port sends no text"),
+        (true, b"$GPGGA,123519,4807.038,N\r\n".to_vec(), "not the weeder's firmware that answers, but \"$GPGGA,"),
         (false, b"Grbl 1.1h\r\nok\r\n".to_vec(), "not the weeder's firmware that answers, but \"Grbl 1.1h\""),
     ] {
         let error = over(resets, move |_| answer.clone()).err().unwrap().to_string();

@@ -194,8 +194,11 @@ impl LogWriter {
             Happening::Answer(line) => self.line(time_ms, Kind::Answer, line),
             // What `revert` restored, or another session set, follows from no other line.
             Happening::Settings(_, lines) => lines.iter().try_for_each(|line| self.line(time_ms, Kind::Answer, line)),
-            // They follow from the commands.
-            Happening::Unanswered { .. } | Happening::Answered { .. } | Happening::Examples(_) => Ok(()),
+            // They follow from other lines.
+            Happening::Unanswered { .. }
+            | Happening::Answered { .. }
+            | Happening::Examples(_)
+            | Happening::Warning(_) => Ok(()),
         }
     }
 

@@ -86,7 +86,7 @@ impl Swing {
     pub fn fitted(machine: &Machine, torque: Torque, settings: &Settings) -> Result<Self, String> {
         let pulses = [Setting::ServoInUs, Setting::ServoOutUs];
         let tool_mm = MM.value(machine.intra_row.width);
-        if pulses.iter().all(|&pulse| settings.get(pulse) == pulse.description().default) {
+        if pulses.iter().all(|&pulse| settings.get(pulse) == pulse.default()) {
             return Self::with_tool(machine, torque, settings, tool_mm, machine.swing.pulse_in, true);
         }
         let [in_us, out_us] = pulses.map(|pulse| f64::from(settings.get(pulse)));

@@ -212,7 +212,7 @@ mod tests {
 
     #[test]
     fn what_a_newer_firmware_may_know_is_sent_last() {
-        let from = Setting::all().map(|setting| (name(setting), setting.description().default)).collect();
+        let from = Setting::all().map(|setting| (name(setting), setting.default())).collect();
         let to = [("a_new_one".to_owned(), 3), ("margin_mm".to_owned(), 60)].into();
         let answer = Change { from, to }.steps();
         assert_eq!(answer["steps"], json!([["margin_mm", 60], ["a_new_one", 3]]));

@@ -4,10 +4,8 @@
 //! The memory does not grow with the number of pages.
 
 use super::knowledge::Knowledge;
-use control::alarm::Warning;
 use link::moment::Moment;
 use link::session::Unanswered;
-use link::{EventLine, advice};
 use parking_lot::Mutex;
 use serde_json::{Value, json};
 use std::sync::Arc;
@@ -15,9 +13,6 @@ use tokio::sync::broadcast::{self, Receiver};
 
 /// Most messages of a machine that a page may be behind: some ten seconds of work.
 const BEHIND: usize = 128;
-
-/// This warning stays until all settings are saved.
-const OLDER: &str = "warning name=settings_older";
 
 /// A message to the pages.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -51,7 +46,7 @@ impl Hub {
     pub fn new(machines: usize, first: u64, clock: Clock) -> Self {
         let state = State {
             machines: (0..machines)
-                .map(|machine| json!({ "machine": machine, "is": "lost", "why": "its port is being opened" }))
+                .map(|machine| json!({ "machine": machine, "is": "lost", "why": "Waiting for the machine to answer." }))
                 .collect(),
             restarted: vec![None; machines],
             knowledge: Knowledge::new(first, machines),
@@ -74,20 +69,9 @@ impl Hub {
         match news["is"].as_str().unwrap_or_default() {
             "there" | "lost" => *known = news,
             "restarted" => state.restarted[machine] = Some(news),
-            what @ ("status" | "settings" | "examples") if known["is"] == "there" => {
+            what @ ("status" | "warning" | "settings" | "examples") if known["is"] == "there" => {
                 known[what] = news["said"].clone();
-                // A line says what is saved only if that differs.
-                if what == "settings" && known["warning"] == OLDER && !news["said"].to_string().contains("saved") {
-                    known["warning"] = Value::Null;
-                }
             }
-            "event" => match EventLine::parse(news["said"].as_str().unwrap_or_default()) {
-                Some(EventLine::Warning { .. }) => known["warning"] = news["said"].clone(),
-                Some(event) if warned(&known["warning"]).is_some_and(|warning| advice::ends(event, warning)) => {
-                    known["warning"] = Value::Null;
-                }
-                _ => {}
-            },
             _ => {}
         }
     }
@@ -143,14 +127,6 @@ impl Hub {
     }
 }
 
-/// The warning in a line.
-fn warned(line: &Value) -> Option<Warning> {
-    match EventLine::parse(line.as_str()?)? {
-        EventLine::Warning { warning } => Some(warning),
-        _ => None,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -169,6 +145,7 @@ mod tests {
         hub.news(0, there.news());
         hub.news(0, json!({ "is": "status", "said": "state=hold" }));
         hub.news(0, json!({ "is": "settings", "said": ["k=3"] }));
+        hub.news(0, json!({ "is": "warning", "said": "no_plants" }));
         // A lost machine has no status.
         hub.news(1, json!({ "is": "status", "said": "state=work" }));
         let (now, mut later) = hub.listen();
@@ -183,8 +160,9 @@ mod tests {
                 "settings": ["k=3"],
                 "examples": ["field 0"],
                 "status": "state=hold",
+                "warning": "no_plants",
             }),
-            json!({ "machine": 1, "is": "lost", "why": "its port is being opened" }),
+            json!({ "machine": 1, "is": "lost", "why": "Waiting for the machine to answer." }),
         ];
         assert_eq!(now, expected);
         assert_eq!(hub.why_lost(0), None);
@@ -197,34 +175,5 @@ mod tests {
         let heard: Vec<Value> = std::iter::from_fn(|| later.try_recv().ok()).map(|message| read(&message)).collect();
         assert_eq!(heard, expected);
         assert_eq!(hub.why_lost(0).as_deref(), Some("pulled"));
-    }
-
-    #[test]
-    fn a_new_page_gets_a_warning_until_it_ends() {
-        let hub = Hub::new(1, 5000, Box::new(Moment::now));
-        hub.news(0, json!({ "is": "there" }));
-        let detection = "unknown pos=9 votes=0 spacing=8 delay=7 hold=3 actuation=10";
-        let (no_plants, late) = ("warning name=no_plants", "warning name=late_command");
-        let event = |said: &str| json!({ "is": "event", "said": said });
-        let settings = |saved| json!({ "is": "settings", "said": [format!("k=5 from 1 to 15, default 3{saved}")] });
-        for (news, warning) in [
-            (event(no_plants), json!(no_plants)),
-            (event("state is=work"), Value::Null),
-            (event(no_plants), json!(no_plants)),
-            (event(detection), Value::Null),
-            (event(late), json!(late)),
-            (event(detection), json!(late)),
-            (event("state is=work"), json!(late)),
-            (settings(""), json!(late)),
-            (event("state is=hold"), Value::Null),
-            (event(OLDER), json!(OLDER)),
-            (event("state is=hold"), json!(OLDER)),
-            (settings(", saved 3"), json!(OLDER)),
-            (settings(", not saved"), json!(OLDER)),
-            (settings(""), Value::Null),
-        ] {
-            hub.news(0, news.clone());
-            assert_eq!(read(&hub.listen().0[0])["warning"], warning, "{news}");
-        }
     }
 }

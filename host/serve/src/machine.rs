@@ -198,7 +198,7 @@ impl Talk {
                 }
                 self.hub.news(self.number, news);
             }
-            Happening::Status(..) | Happening::Settings(..) | Happening::Examples(_) => {
+            Happening::Status(..) | Happening::Warning(_) | Happening::Settings(..) | Happening::Examples(_) => {
                 self.hub.news(self.number, news);
             }
             Happening::Started { .. } | Happening::Command(_) => {}

@@ -319,7 +319,7 @@ impl SetUp {
             Task::SetMargin => match self.margin(settings) {
                 Err(missing) => missing.first().map(Step::to_string),
                 Ok(margin) => {
-                    let default_mm = Setting::MarginMm.description().default;
+                    let default_mm = Setting::MarginMm.default();
                     let is_done = margin.in_use_mm == margin.least_mm()
                         || (margin.least_mm()..default_mm).contains(&margin.in_use_mm);
                     (!is_done).then(|| Step::SetMargin(margin).to_string())
@@ -347,7 +347,7 @@ impl SetUp {
             return None;
         }
         let in_use_mm = settings.get(Setting::MarginMm);
-        let safe_mm = Setting::MarginMm.description().default;
+        let safe_mm = Setting::MarginMm.default();
         match self.margin(settings) {
             Ok(margin) => (in_use_mm < margin.least_mm())
                 .then(|| format!("margin_mm {in_use_mm} is too small: the measurements need {}", margin.least_mm())),

@@ -234,7 +234,7 @@ fn beside_others(firmware: &[&Total]) -> Table {
             "this report".to_owned(),
         ]);
     }
-    table.rows.extend(MACHINES.iter().map(|machine| machine.map(str::to_owned).to_vec()));
+    table.rows.extend(MACHINES.iter().map(|machine| machine.split(" | ").map(str::to_owned).collect()));
     table
 }
 

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::OnceLock;
 
-use anyhow::{Context, Error, Result, ensure};
+use anyhow::{Context, Error, Result, anyhow, ensure};
 use cargo_metadata::Message;
 use etcetera::BaseStrategy;
 use files::whole_file;
@@ -24,6 +24,9 @@ static INSIDE: OnceLock<&[(&str, &[u8])]> = OnceLock::new();
 
 /// The folder with the files inside, or the error, once they were written in this process.
 static WRITTEN: OnceLock<Result<PathBuf, String>> = OnceLock::new();
+
+/// The variable that names the cache folder.
+const CACHE: &str = if cfg!(windows) { "LOCALAPPDATA" } else { "XDG_CACHE_HOME" };
 
 /// A program for the chip.
 pub struct Program {
@@ -155,7 +158,8 @@ pub fn optiboot() -> Result<Option<PathBuf>> {
 fn inside() -> Result<Option<&'static Path>> {
     let Some(files) = INSIDE.get() else { return Ok(None) };
     let written = WRITTEN.get_or_init(|| {
-        let home = etcetera::choose_base_strategy().map_err(|error| format!("no folder for the firmware: {error}"))?;
+        let home = etcetera::choose_base_strategy()
+            .map_err(|error| format!("no folder for the firmware: {error}: let HOME name a writable folder"))?;
         write(files, &home.cache_dir()).map_err(|error| format!("{error:#}"))
     });
     written.as_deref().map(Some).map_err(|error| Error::msg(error.clone()))
@@ -173,7 +177,10 @@ fn write(files: &[(&str, &[u8])], cache: &Path) -> Result<PathBuf> {
         }
         fs::create_dir_all(path.parent().unwrap_or(&folder))
             .and_then(|()| whole_file::write(&path, |to| to.write_all(content)))
-            .with_context(|| format!("the firmware of this weeder cannot be written to {}", path.display()))?;
+            .map_err(|error| {
+                let path = path.display();
+                anyhow!("the firmware cannot be written to {path}: {error}: let {CACHE} name a writable folder")
+            })?;
     }
     Ok(folder)
 }
@@ -206,6 +213,13 @@ mod tests {
         assert_eq!(fs::read(folder.join("yard/tester/budgets.toml")).unwrap(), b"stack = 1");
         assert_ne!(write(&[("weeder-firmware.elf", b"newer")], cache.path()).unwrap(), folder);
         assert_eq!(fs::read(&elf).unwrap(), b"new");
+    }
+
+    #[test]
+    fn a_firmware_that_cannot_be_written_names_the_variable_for_another_folder() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let error = write(&[("weeder-firmware.elf", b"new")], file.path()).unwrap_err().to_string();
+        assert!(error.ends_with(&format!(": let {CACHE} name a writable folder")), "{error}");
     }
 
     #[test]

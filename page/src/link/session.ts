@@ -34,6 +34,8 @@ export type Happening =
     /** The machine is lost: for good, as the operator wanted or not, or until it has restarted. */
     | { is: "lost"; why: string; forGood: boolean; isWanted: boolean }
     | { is: "status"; status: Line<"status">; line: string }
+    /** The present warning has changed, or has ended. */
+    | { is: "warning"; warning: string | undefined }
     /** The machine sent an event line. */
     | { is: "event"; event: EventLine; line: string }
     | { is: "command"; line: string }
@@ -80,9 +82,10 @@ export type News =
           examples: readonly string[];
           help: Readonly<Record<string, string>>;
           status?: string;
-          /** The event line of a warning that has not ended. */
           warning?: string | null;
       }
+    /** The present warning's name. */
+    | { is: "warning"; said: string | null }
     | { is: "settings" | "examples"; said: readonly string[] }
     | { is: "status" | "event"; said: string }
     /** `weeder serve` tells only of restarts at work. */
@@ -96,9 +99,12 @@ export function tell(news: News, onHappening: (happening: Happening) => void): v
             const help = new Map(Object.entries(news.help));
             onHappening({ is: "connected", version, settings: linesOf("setting", news.settings), examples, help });
             if (status !== undefined) tell({ is: "status", said: status }, onHappening);
-            if (warning) tell({ is: "event", said: warning }, onHappening);
+            if (warning) tell({ is: "warning", said: warning }, onHappening);
             break;
         }
+        case "warning":
+            onHappening({ is: "warning", warning: news.said ?? undefined });
+            break;
         case "settings":
             onHappening({ is: "settings", settings: linesOf("setting", news.said), lines: news.said });
             break;

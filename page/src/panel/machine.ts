@@ -92,9 +92,6 @@ export class Machine {
                 break;
             case "settings":
                 this.settings = happening.settings;
-                // A line says what is saved only if that differs.
-                if (this.warning === "settings_older" && !happening.lines.join().includes("saved"))
-                    this.warning = undefined;
                 break;
             case "examples":
                 this.examples = happening.examples;
@@ -111,6 +108,9 @@ export class Machine {
                 );
                 break;
             }
+            case "warning":
+                this.warning = happening.warning;
+                break;
             case "event":
                 this.#take(happening.event);
                 break;
@@ -123,23 +123,17 @@ export class Machine {
             case "detection":
                 this.objects = [event, ...this.objects].slice(0, OBJECTS);
                 this.zones = [event, ...this.zones].slice(0, OBJECTS);
-                if (this.warning === "no_plants") this.warning = undefined;
                 break;
             case "state":
                 this.mode = event.mode;
                 if (event.mode === "work") this.restarted = undefined;
                 if (event.mode !== "alarm") this.alarm = undefined;
-                if (event.mode === "hold" ? this.warning !== "settings_older" : this.warning === "no_plants")
-                    this.warning = undefined;
                 break;
             case "swing":
                 this.toolOut = event.out;
                 break;
             case "alarm":
                 [this.mode, this.toolOut, this.alarm, this.zones] = ["alarm", true, event.alarm, []];
-                break;
-            case "warning":
-                this.warning = event.warning;
                 break;
             default:
         }

@@ -309,12 +309,8 @@ impl RowModel {
                 self.zones.clear();
             }
             Happening::Event(event, _) => self.take_event(event),
-            Happening::Settings(settings, lines) => {
-                self.settings = settings;
-                // A line says what is saved only if that differs.
-                let are_saved = !lines.iter().any(|line| line.contains("saved"));
-                self.warned = self.warned.filter(|&warning| warning != Warning::SettingsOlder || !are_saved);
-            }
+            Happening::Warning(warning) => self.warned = warning,
+            Happening::Settings(settings, _) => self.settings = settings,
             Happening::Answered { refusal, .. } => {
                 self.answer = if refusal.is_some() { Answer::Refused } else { Answer::Done };
             }
@@ -348,7 +344,6 @@ impl RowModel {
     }
 
     fn take_event(&mut self, event: EventLine) {
-        self.warned = self.warned.filter(|&warning| !advice::ends(event, warning));
         match event {
             EventLine::Detection { class, position, votes, spacing, hold, .. } => {
                 // The hold includes both margins.
@@ -362,7 +357,6 @@ impl RowModel {
             }
             EventLine::Alarm { .. } => self.zones.clear(),
             EventLine::State { mode: Mode::Work } => self.restarted = None,
-            EventLine::Warning { warning } => self.warned = Some(warning),
             _ => {}
         }
     }

@@ -218,9 +218,6 @@ impl<'a> Talk<'a> {
                     tell!("{}", self.chosen.under_name(row, &other));
                 }
             }
-            What::Happened(
-                Happening::Settings(..) | Happening::Examples(_) | Happening::Command(_) | Happening::Unanswered { .. },
-            ) => {}
             What::Happened(Happening::Status(..)) => standing.statuses += 1,
             What::Happened(Happening::Started { while_at_work, .. }) => {
                 if let Some(cause) = while_at_work {
@@ -251,6 +248,7 @@ impl<'a> Talk<'a> {
                     self.finding = Finding::Bad;
                 }
             }
+            What::Happened(_) => {}
             What::NotTyped { command, why } => {
                 standing.unanswered.retain(|waiting| waiting != command);
                 standing.has_failed = true;

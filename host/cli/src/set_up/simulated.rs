@@ -109,7 +109,7 @@ pub fn expected(settings: &Settings, machine: &Machine) -> Result<String> {
     // The simulated servo turns by the same angle, by its own pulses.
     let stroke_us = f64::from(settings.get(Setting::ServoInUs).abs_diff(settings.get(Setting::ServoOutUs)));
     let simulated_us = (stroke_us * Arm::default().us_for_90 / swing.pulse_for_90).round();
-    let in_us = f64::from(Setting::ServoInUs.description().default);
+    let in_us = f64::from(Setting::ServoInUs.default());
     conditions.set(&name(Setting::ServoOutUs), in_us + simulated_us)?;
     let totals = weeded(&conditions)?;
     let total = totals.first().context("no row was weeded")?;

@@ -15,7 +15,7 @@ use uno::pty::Pty;
 /// The answer to `get`: `wheel_mm` has a wider range, `k` is gone, and two settings are new.
 fn settings([lamp, wheel, margin]: [&str; 3]) -> String {
     let line = |setting: Setting| {
-        let (name, wanted) = (setting.text(), setting.description());
+        let name = setting.text();
         let unit = setting.unit();
         match name.to_string().as_str() {
             "wheel_mm" => format!("wheel_mm={wheel} mm from 200 to 1200, default 400\r\n"),
@@ -23,7 +23,7 @@ fn settings([lamp, wheel, margin]: [&str; 3]) -> String {
             "k" => String::new(),
             _ if setting.is_switched() => format!("{name}=off on or off, default off\r\n"),
             _ => {
-                let (value, least, greatest) = (wanted.default, wanted.least, wanted.greatest);
+                let (value, least, greatest) = (setting.default(), setting.least(), setting.greatest());
                 format!("{name}={value}{unit} from {least} to {greatest}, default {value}\r\n")
             }
         }

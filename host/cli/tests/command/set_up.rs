@@ -151,11 +151,7 @@ fn the_steps_in_their_order_end_at_the_machine_that_is_set_up() {
     assert_eq!(fitted, set_up, "the parts");
     for setting in [Setting::ServoInUs, Setting::ServoOutUs, Setting::StemZoneMm, Setting::MarginMm] {
         let of_the_field = set_up.settings.get(&name(setting)).copied();
-        assert_eq!(
-            novice.settings().get(setting),
-            of_the_field.unwrap_or(setting.description().default),
-            "{setting:?}"
-        );
+        assert_eq!(novice.settings().get(setting), of_the_field.unwrap_or(setting.default()), "{setting:?}");
     }
     // Two measurements of the servo differ by some milliseconds.
     for setting in [Setting::LeadOutMs, Setting::LeadInMs] {

@@ -4,7 +4,7 @@
 //! `UPDATE_EXPECT=1 cargo test -p weeder-cli --test command tables` updates them.
 
 use control::alarm::{Alarm, Warning};
-use control::settings::{Description, Setting};
+use control::settings::Setting;
 use expect_test::{ExpectFile, expect_file};
 use field::conditions::{Conditions, Parameter};
 use field::wiring::{self, WIRES};
@@ -208,7 +208,7 @@ fn the_settings_to_set_first_have_the_defaults_that_the_manual_gives() {
         for (cell, default) in names.split(", ").zip(defaults.split(", ")) {
             let setting = Setting::all().find(|&setting| cell == format!("`{}`", name(setting)));
             let Some(setting) = setting else { continue };
-            assert_eq!(default, setting.description().default.to_string(), "{line}");
+            assert_eq!(default, setting.default().to_string(), "{line}");
             found += 1;
         }
     }
@@ -318,15 +318,14 @@ fn settings() -> String {
     let mut values =
         "| name | unit | from | to | default | set in |\n| --- | --- | --- | --- | --- | --- |\n".to_owned();
     for setting in Setting::all() {
-        let Description { least, greatest, default, hold_only } = setting.description();
         let shown = |value: u16| match (setting.is_switched(), value) {
             (true, 0) => "off".to_owned(),
             (true, _) => "on".to_owned(),
             (false, _) => value.to_string(),
         };
         let (name, unit, help) = (name(setting), unit(setting), help(setting));
-        let (least, greatest, default) = (shown(least), shown(greatest), shown(default));
-        let set_in = if hold_only { "hold" } else { "any state" };
+        let (least, greatest, default) = (shown(setting.least()), shown(setting.greatest()), shown(setting.default()));
+        let set_in = if setting.is_hold_only() { "hold" } else { "any state" };
         writeln!(meanings, "| `{name}` | {help} |").expect("a string takes everything");
         writeln!(values, "| `{name}` | {unit} | {least} | {greatest} | {default} | {set_in} |")
             .expect("a string takes everything");

@@ -1,8 +1,12 @@
 //! What happens in a session.
 
 use crate::settings::{Settings, helps};
-use crate::{EventLine, Status};
+use crate::{EventLine, Mode, Status};
+use control::alarm::Warning;
 use serde_json::{Value, json};
+
+/// Warnings that the answer to `status` does not name. They last until the machine holds.
+pub(super) const UNTIL_HOLD: [Warning; 2] = [Warning::LateCommand, Warning::SlipUnknown];
 
 /// Something that happened in a session.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -29,6 +33,8 @@ pub enum Happening {
     Lost(String),
     /// The machine's status.
     Status(Status, String),
+    /// The present warning has changed, or has ended. There is none at a connection.
+    Warning(Option<Warning>),
     /// The machine sent an event line.
     Event(EventLine, String),
     /// A command was typed.
@@ -60,6 +66,17 @@ pub enum Happening {
 }
 
 impl Happening {
+    /// The present warning after this. `warning` is the one before.
+    pub(super) fn warning_after(&self, warning: Option<Warning>) -> Option<Warning> {
+        match self {
+            Self::Event(EventLine::Warning { warning }, _) => Some(*warning),
+            Self::Event(EventLine::State { mode: Mode::Hold }, _) => {
+                warning.filter(|warning| !UNTIL_HOLD.contains(warning))
+            }
+            _ => warning,
+        }
+    }
+
     /// This in the form of `News` in `page/src/link/session.ts`.
     pub fn news(&self) -> Value {
         match self {
@@ -71,6 +88,9 @@ impl Happening {
             }
             Self::Lost(why) => json!({ "is": "lost", "why": why }),
             Self::Status(_, line) => json!({ "is": "status", "said": line }),
+            Self::Warning(warning) => {
+                json!({ "is": "warning", "said": warning.map(|warning| warning.text().to_string()) })
+            }
             Self::Event(_, line) => json!({ "is": "event", "said": line }),
             Self::Settings(_, lines) => json!({ "is": "settings", "said": lines }),
             Self::Examples(lines) => json!({ "is": "examples", "said": lines }),

@@ -3,7 +3,7 @@
 
 use super::{Asked, EVENTS, EXAMPLES, HOLD, Happening, POLL, SETTINGS, STATUS, Session, State, VERSION};
 use crate::settings::{self, Shown};
-use crate::{COMMAND_LENGTH, ConsoleLine, EventLine, LinkError, Status, Values, lines};
+use crate::{COMMAND_LENGTH, ConsoleLine, Counts, LinkError, Status, lines};
 
 /// Further tries to ask for everything, if an answer is missing or belongs to another question.
 const RETRIES: usize = 2;
@@ -104,16 +104,12 @@ impl Session {
         self.state = State::Ready;
         (self.poll_at, self.is_loss_told) = (self.waited + POLL, true);
         self.turn.happened.push(Happening::Connected { version, settings, shown, examples });
-        // The machine announces a warning once, perhaps before this connection.
-        let warning = status.iter().find_map(|line| Values(line).text("warning")).and_then(|name| {
-            let line = ["warning name=", name].concat();
-            let is_told = early.iter().any(|told| matches!(told, Happening::Event(_, said) if *said == line));
-            let event = EventLine::parse(&line).filter(|_| !is_told)?;
-            Some(Happening::Event(event, line))
-        });
+        self.warning = None;
+        let named = status.iter().find_map(|line| Counts::parse(line)?.warning);
         // Before the first event, so that a log begins with the machine's state.
         let status = status.into_iter().find_map(|line| Some(Happening::Status(Status::parse(&line)?, line)));
-        status.into_iter().chain(warning).chain(early).for_each(|happening| self.report(happening));
+        status.into_iter().chain(early).for_each(|happening| self.report(happening));
+        self.take_named(named);
     }
 }
 
@@ -125,41 +121,60 @@ pub(crate) fn silence(question: &str, answer: &[String], partial: &str) -> LinkE
         return LinkError::Noise;
     }
     let tail = received.char_indices().rev().nth(200).map_or(0, |(at, _)| at);
-    LinkError::Silent { command: question.to_owned(), received: received[tail..].trim().to_owned() }
+    let received = received[tail..].trim().to_owned();
+    // Such as a satellite receiver at a converter that Unos have too.
+    if question == VERSION && !received.is_empty() {
+        return LinkError::NotTheWeeder(received);
+    }
+    LinkError::Silent { command: question.to_owned(), received }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::moment::Moment;
-    use std::assert_matches;
+    use control::alarm::Warning;
     use std::time::Duration;
 
     #[test]
-    fn a_warning_in_the_first_status_is_reported_once_whether_the_machine_has_announced_it_or_not() {
-        for examples in ["ok\r\n", "warning name=settings_older\r\nok\r\n"] {
-            let (mut session, mut now, mut happened) = (Session::default(), Moment::default(), Vec::new());
-            session.open(false);
-            while !session.is_connected() {
-                let answer = match session.asked.front().map_or("", |asked| asked.line.as_str()) {
-                    "" => "",
-                    VERSION => "weeder 0.2.0\r\nok\r\n",
-                    SETTINGS => "k=3 from 1 to 15, default 3, not saved\r\nok\r\n",
-                    EXAMPLES => examples,
-                    STATUS => {
-                        "state=hold tool=out pos=0 speed_mm_s=0 windows=0 unseen_mm=400\r\n\
-                         lost=0 warning=settings_older\r\nok\r\n"
-                    }
-                    _ => "ok\r\n",
-                };
+    fn a_warning_lasts_while_the_status_names_it_and_one_that_it_does_not_name_until_the_next_hold() {
+        let (mut session, mut now) = (Session::default(), Moment::default());
+        session.open(false);
+        let mut warnings = |said: &str, named: &str| {
+            let (mut received, mut warnings) = (said.to_owned(), Vec::new());
+            for _ in 0..25 {
                 now = now.after(Duration::from_millis(20));
-                happened.extend(session.turn(now, answer.as_bytes()).happened);
+                let happened = session.turn(now, received.as_bytes()).happened;
+                warnings.extend(happened.into_iter().filter_map(|happening| match happening {
+                    Happening::Warning(warning) => Some(warning),
+                    _ => None,
+                }));
+                received = match session.asked.front().map_or("", |asked| asked.line.as_str()) {
+                    "" => String::new(),
+                    VERSION => "weeder 0.2.0\r\nok\r\n".to_owned(),
+                    SETTINGS => "k=3 from 1 to 15, default 3, not saved\r\nok\r\n".to_owned(),
+                    STATUS => format!(
+                        "state=hold tool=out pos=0 speed_mm_s=0 windows=0 unseen_mm=400\r\n\
+                         lost=0 jumps=0 late=0 missed=0 mistakes=0 dust=0 stack_free=9 reset=button{named}\r\nok\r\n"
+                    ),
+                    _ => "ok\r\n".to_owned(),
+                };
             }
-            assert_matches!(
-                &happened[..],
-                [Happening::Connected { .. }, Happening::Status(..), Happening::Event(_, line)]
-                    if line == "warning name=settings_older"
-            );
+            warnings
+        };
+        let (older, no_plants) = (" warning=settings_older", " warning=no_plants");
+        let cases: [(&str, &str, &[Option<Warning>]); 8] = [
+            ("", older, &[Some(Warning::SettingsOlder)]),
+            ("warning name=late_command\r\n", older, &[Some(Warning::LateCommand)]),
+            ("state is=work\r\n", older, &[]),
+            ("state is=hold\r\n", older, &[None, Some(Warning::SettingsOlder)]),
+            ("", "", &[None]),
+            ("warning name=no_plants\r\n", no_plants, &[Some(Warning::NoPlants)]),
+            ("state is=hold\r\n", no_plants, &[]),
+            ("", "", &[None]),
+        ];
+        for (said, named, changes) in cases {
+            assert_eq!(warnings(said, named), changes, "{said:?}{named}");
         }
     }
 }

@@ -385,7 +385,7 @@ fn a_device_that_never_ends_its_answer_is_given_up_after_each_try_s_longest_time
     let try_time = LONGEST_SETTLING + ANSWER_TIME + Duration::from_millis(100);
     assert_eq!(asked.len(), 3);
     assert!(asked.iter().chain([&now.ticking]).is_sorted_by(|one, next| **next - **one <= try_time), "{asked:?}");
-    assert_matches!(session.take_failure(), Some(LinkError::Silent { .. }));
+    assert_matches!(session.take_failure(), Some(LinkError::NotTheWeeder(_)));
 }
 
 /// What a caller knows of a command.

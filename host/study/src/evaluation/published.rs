@@ -10,7 +10,6 @@
 //! engine. Eq. 30, where it falls, does not.
 
 use super::plot::Response;
-use crate::table::NOTHING;
 use serde::Serialize;
 
 /// The least and greatest speed of its trial, km/h. Its slopes are not valid beyond them.
@@ -23,62 +22,14 @@ pub const DAMAGED_PERCENT: (f64, f64) = (0.0, 3.92);
 /// Each source counts weeds in its own way.
 ///
 /// The name, the crop, the sensor for plants, the speeds in km/h, the weeds removed in percent and where they were
-/// counted, the crop plants damaged in percent, and the publication.
-pub const MACHINES: [[&str; 7]; 6] = [
-    [
-        "the paper's",
-        "chilli",
-        "a light beam",
-        "1 to 2.5",
-        "80.1 to 89.5, in the plot",
-        "0 to 3.92",
-        "the paper, Eq. 28 and 29",
-    ],
-    [
-        "Jia et al., a tool that moves in a spiral",
-        "maize",
-        "an infrared beam",
-        "4 to 7",
-        "95.8",
-        "0.6",
-        "Int. J. Agric. Biol. Eng. 14(6), 2021, doi 10.25165/j.ijabe.20211406.6542",
-    ],
-    [
-        "Cordill and Grift, two tines",
-        "maize",
-        "the stalk's width",
-        NOTHING,
-        NOTHING,
-        "8.8 without weeds, 23.7 among weeds",
-        "Biosystems Engineering, 2011, doi 10.1016/j.biosystemseng.2011.07.007",
-    ],
-    [
-        "Tillett et al., a rotating disc",
-        "cabbage",
-        "a camera",
-        "1.8",
-        "62 to 87, within 240 mm of a plant",
-        "low",
-        "Biosystems Engineering, 2008",
-    ],
-    [
-        "Jiang et al., knives and herbicide",
-        "maize; cabbage",
-        "a camera",
-        "2.0",
-        "90.0; 94.5",
-        "1.9; 0.8",
-        "Soil and Tillage Research, 2023, doi 10.1016/j.still.2023.105837",
-    ],
-    [
-        "electric swinging knives",
-        "cabbage",
-        "a camera",
-        "low, in a laboratory",
-        "96.67",
-        "0.83",
-        "Agronomy 15(1) 112, 2025",
-    ],
+/// counted, the crop plants damaged in percent, and the publication. A dash is for nothing known.
+pub const MACHINES: [&str; 6] = [
+    "the paper's | chilli | a light beam | 1 to 2.5 | 80.1 to 89.5, in the plot | 0 to 3.92 | the paper, Eq. 28 and 29",
+    "Jia et al., a tool that moves in a spiral | maize | an infrared beam | 4 to 7 | 95.8 | 0.6 | Int. J. Agric. Biol. Eng. 14(6), 2021, doi 10.25165/j.ijabe.20211406.6542",
+    "Cordill and Grift, two tines | maize | the stalk's width | – | – | 8.8 without weeds, 23.7 among weeds | Biosystems Engineering, 2011, doi 10.1016/j.biosystemseng.2011.07.007",
+    "Tillett et al., a rotating disc | cabbage | a camera | 1.8 | 62 to 87, within 240 mm of a plant | low | Biosystems Engineering, 2008",
+    "Jiang et al., knives and herbicide | maize; cabbage | a camera | 2.0 | 90.0; 94.5 | 1.9; 0.8 | Soil and Tillage Research, 2023, doi 10.1016/j.still.2023.105837",
+    "electric swinging knives | cabbage | a camera | low, in a laboratory | 96.67 | 0.83 | Agronomy 15(1) 112, 2025",
 ];
 
 /// A response as a linear function of speed (A, km/h) and plant spacing (B, cm), with the printed coefficients.
