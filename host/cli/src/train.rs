@@ -67,6 +67,9 @@ pub struct Arguments {
     json: bool,
 }
 
+/// A training of so many detections takes half a minute. The time grows with the square of their number.
+const QUICK: usize = 5000;
+
 /// How many examples vote; `None` for the best number.
 type Votes = Option<u8>;
 
@@ -111,6 +114,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         false => report(&training, &objects, another_field.as_ref()),
     };
     tell_k(training.k);
+    if let Some(plants) = training.forgotten() {
+        tell!(
+            "The table leaves {plants} plants more unknown than all detections together: allow more examples (--max, at most {MOST_EXAMPLES}), or take out weeds with a wrong label"
+        );
+    }
     let is_rust = table.as_ref().is_some_and(|table| is_rust(table.path()));
     write_if_asked(table.as_ref(), "Table", arguments.json, |to| match is_rust {
         true => Ok(to.write_all(listing::rust(&training, &arguments.command()).as_bytes())?),
@@ -127,7 +135,7 @@ impl Arguments {
         if self.synthetic {
             return synthetic::objects(self.crop, self.seed);
         }
-        let ToLearn { labelled, unlabelled, repeated, contradictions } = table::read_labelled(&self.files)?;
+        let ToLearn { labelled, unlabelled, repeated, contradictions, misread } = table::read_labelled(&self.files)?;
         if unlabelled > 0 {
             tell!("Passed over {unlabelled} without a label");
         }
@@ -136,6 +144,16 @@ impl Arguments {
         }
         if let Some(first) = contradictions.first() {
             tell!("Learned {} with both labels, such as {first}", contradictions.len());
+        }
+        let count = labelled.len();
+        // As many weeds can be unknown to a table that knows its crop.
+        if 10 * misread > count {
+            tell!(
+                "The machine answered {misread} of {count} otherwise, so spacings behind them are not those at work: teach some first, and roll again"
+            );
+        }
+        if count > QUICK {
+            tell!("Learning from {count} detections takes long: half as many take a quarter of the time");
         }
         Ok(labelled)
     }

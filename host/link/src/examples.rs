@@ -6,7 +6,7 @@
 
 use super::{Class, ConsoleLine, Link, LinkError, Mode, settings};
 use control::ground::class::{Classifier, label};
-use control::ground::examples::{EXAMPLES, SCALE};
+use control::ground::examples::{EXAMPLES, SCALE, SCALE_BYTES};
 use control::ground::features::{COUNT, Features};
 pub use control::ground::field_examples::CAPACITY;
 use control::ground::nearest::Nearest;
@@ -168,8 +168,8 @@ pub fn example_of(features: &Features, label: u8) -> Taught {
 }
 
 /// The features of an example in millimetres and millimetres a second. Each feature is the middle of the values that
-/// have its byte; for an open-ended range it is the nearest value. Converting back gives the same bytes. `None` if no
-/// value has one of the bytes: no detection gives such an example.
+/// have its byte; for an open-ended range it is the nearest value. A table with one value of a feature gives that value.
+/// Converting back gives the same bytes. `None` if no value has one of the bytes: no detection gives such an example.
 pub fn features_of(example: &Taught) -> Option<Features> {
     let mut values = [0; COUNT];
     for (feature, value) in values.iter_mut().enumerate() {
@@ -186,14 +186,21 @@ static VALUES: LazyLock<[HashMap<u8, i16>; COUNT]> = LazyLock::new(|| {
             let byte = SCALE.quantise(&[value; COUNT])[feature];
             spans.entry(byte).or_insert((value, value)).1 = value;
         }
-        let middle = |(byte, (first, last)): (u8, (i16, i16))| match (first, last) {
-            (i16::MIN, _) => (byte, last),
-            (_, i16::MAX) => (byte, first),
-            _ => (byte, i16::midpoint(first, last)),
-        };
-        spans.into_iter().map(middle).collect()
+        let lowest = i16::from_le_bytes([SCALE_BYTES[8 * feature], SCALE_BYTES[8 * feature + 1]]);
+        spans.into_iter().map(|(byte, (first, last))| (byte, representative(first, last, lowest))).collect()
     })
 });
+
+/// The value for the values from `first` to `last`, which have one byte. `lowest` is the lowest of the scale's range.
+fn representative(first: i16, last: i16, lowest: i16) -> i16 {
+    match (first, last) {
+        // All values have this byte: a table of one speed has a range of one value.
+        (i16::MIN, i16::MAX) => lowest,
+        (i16::MIN, _) => last,
+        (_, i16::MAX) => first,
+        _ => i16::midpoint(first, last),
+    }
+}
 
 /// The class that the built-in examples clearly give, if it differs from the label. The machine refuses such a label
 /// unless it is forced.
@@ -220,6 +227,14 @@ mod tests {
     fn features_that_no_object_has_are_none() {
         let strange = (0..=u8::MAX).map(|byte| Example::new([64, 64, byte, 64, 64], label::WEED));
         assert!(strange.filter(|example| features_of(example).is_none()).count() > 0);
+    }
+
+    #[test]
+    fn a_feature_with_one_value_in_the_table_keeps_it() {
+        assert_eq!(representative(i16::MIN, i16::MAX, 278), 278);
+        for (first, last, value) in [(i16::MIN, 69, 69), (902, i16::MAX, 902), (70, 74, 72)] {
+            assert_eq!(representative(first, last, 70), value);
+        }
     }
 
     #[test]

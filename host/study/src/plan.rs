@@ -4,6 +4,7 @@
 //! can be separated from the treatments. Blocks are the replications of the table that [`crate::evaluation`] reads.
 
 use crate::evaluation::{COLUMNS, PlotRecord};
+use files::in_a_line;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -53,7 +54,7 @@ impl Plan {
     /// The errors of the writer.
     pub fn write_csv(&self, notes: &[String], mut to: impl io::Write) -> io::Result<()> {
         for note in notes {
-            writeln!(to, "# {note}")?;
+            writeln!(to, "# {}", in_a_line(note))?;
         }
         writeln!(to, "plot,{}", COLUMNS.map(|(column, ..)| column).join(","))?;
         for plot in self.plots() {
@@ -130,6 +131,14 @@ mod tests {
         let slow = (0..800).filter(|&seed| (first(seed).speed_km_h, first(seed).spacing_cm) == (1.0, 50.0)).count();
         // One of eight, within four standard deviations.
         assert!((62..=138).contains(&slow), "{slow} of 800");
+    }
+
+    #[test]
+    fn a_note_stays_in_its_line() {
+        let mut table = Vec::new();
+        plan(1).write_csv(&["weeder plan --out 'a\nb.csv'".to_owned()], &mut table).unwrap();
+        let table = String::from_utf8(table).unwrap();
+        assert!(table.starts_with("# weeder plan --out 'a\\nb.csv'\nplot,replication,"), "{table}");
     }
 
     #[test]

@@ -78,6 +78,12 @@ impl Training {
         let scale = Scale::new(self.ranges);
         Model { scale, radius: self.radius, k: self.k, examples: quantised(&scale, &self.kept) }
     }
+
+    /// How many more plants are unknown by the table than by leave-one-out. `None` if these are at most a fifth of all.
+    pub fn forgotten(&self) -> Option<usize> {
+        let more = self.by_table.plants_unknown().saturating_sub(self.leave_one_out.plants_unknown());
+        (5 * more > self.by_table.count(Kind::Plant)).then_some(more)
+    }
 }
 
 const NO_OBJECTS: &str = "there are no detections to learn from: label some plants and some weeds";

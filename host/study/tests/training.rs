@@ -47,7 +47,7 @@ fn mixed(share: i16, narrowest_plant_mm: i16, step_mm: i16) -> Vec<Labelled> {
 fn each_detection_of_the_simulated_field_is_classified_right_by_all_others() {
     let objects = synthetic::objects(&CROPS[0], 1).unwrap();
     let training = train(&objects, None, DEFAULT_MOST_EXAMPLES).unwrap();
-    assert_eq!(training.k, K);
+    assert_eq!((training.k, training.forgotten()), (K, None));
     for confusion in [training.leave_one_out, training.by_table] {
         let (plants, weeds) = (confusion.count(Kind::Plant) as f64, confusion.count(Kind::Weed) as f64);
         assert!((confusion.plants_taken_for_weeds() as f64) < PLANTS_CUT * plants, "{confusion}");
@@ -152,8 +152,8 @@ fn a_few_plants_among_many_weeds_are_never_taken_for_noise() {
 #[test]
 fn few_examples_decide_like_many() {
     let objects = clear_case();
-    let training = train(&objects, None, 20).unwrap();
-    assert!(training.kept.len() <= 20);
+    let training = train(&objects, None, 21).unwrap();
+    assert!(training.kept.len() <= 21);
     assert_eq!((training.edited_out, training.by_table.accuracy()), (0, Some(1.0)));
 }
 
@@ -201,10 +201,19 @@ fn objects_that_need_more_examples_than_there_is_room_for_are_refused_by_name() 
 fn more_room_never_refuses_what_less_room_takes() {
     // A table filled up with plants would need more weeds.
     let objects = mixed(2, 12, 41);
-    for most in 4..=24 {
+    for most in 5..=24 {
         let training = train(&objects, Some(3), most).unwrap();
         assert!(training.kept.len() <= most, "{most}");
+        // Few plants have room beside the weeds.
+        assert!(training.forgotten().is_some_and(|plants| plants >= 9), "{most}");
     }
+}
+
+#[test]
+fn a_table_without_a_plant_is_refused() {
+    // Four weeds have to be recognised.
+    let error = train(&mixed(2, 12, 41), Some(3), 4).unwrap_err().to_string();
+    assert!(error.starts_with("too many examples: these detections need 5, and there is room for 4: "), "{error}");
 }
 
 #[test]
@@ -212,7 +221,7 @@ fn a_k_whose_table_has_no_room_is_passed_over() {
     let plants = (0..3).map(|n| labelled(Kind::Plant, 556, 500 + n, 150));
     let weeds = (0..3).map(|n| labelled(Kind::Weed, 556, 300 + n, 16));
     let objects: Vec<Labelled> = plants.chain(weeds).collect();
-    assert_eq!([2, 3].map(|most| train(&objects, None, most).unwrap().k), [1, 3]);
+    assert_eq!([2, 4].map(|most| train(&objects, None, most).unwrap().k), [1, 3]);
 }
 
 #[test]
@@ -327,6 +336,17 @@ fn dumps_can_be_pasted_with_their_headers_and_the_ok_that_ends_them() {
         let objects = read_text(&[&dumps]).unwrap();
         assert_eq!(objects, [labelled(Kind::Plant, 694, 500, 150), labelled(Kind::Weed, 694, 300, 17)]);
     }
+}
+
+#[test]
+fn detections_that_the_machine_answered_as_the_other_class_are_counted() {
+    let line = |number: usize, answer, label| format!("694,{}00,226,250,573,{answer},{label}\n", number + 1);
+    let plants = ["plant", "unknown", "weed"].map(|answer| (answer, "plant"));
+    let weeds = ["weed", "unknown", ""].map(|answer| (answer, "weed"));
+    let lines = (0..).zip([plants, weeds].concat()).map(|(number, (answer, label))| line(number, answer, label));
+    let lines: String = lines.collect();
+    let (_folder, paths) = files(&[&(HEADER.replace("label", "answer,label") + &lines)]);
+    assert_eq!(read_labelled(&paths).unwrap().misread, 2);
 }
 
 #[test]

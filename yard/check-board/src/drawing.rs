@@ -12,8 +12,10 @@ const PITCH: usize = 34;
 /// Pixels above the first wire.
 const TOP: usize = 70;
 
-/// Every wire except ground has this resistor.
-const RESISTOR: &str = "1 k";
+/// The resistor in a wire. A board may pull its reset up by 1 k, as the Nano does, so that wire has a smaller one.
+fn resistor(name: &str) -> &str {
+    if name == "reset" { "220" } else { "1 k" }
+}
 
 /// The drawing.
 pub fn wires() -> Document {
@@ -39,13 +41,12 @@ pub fn wires() -> Document {
             .add(text(right + 10, y + 5, "start", wire.weeder))
             .add(text(left + 20, y - 5, "start", wire.name));
         if wire.name != "ground" {
-            let resistor =
-                Rectangle::new().set("x", WIDTH / 2 + 40).set("y", y - 10).set("width", 46).set("height", 20);
-            drawing = drawing.add(resistor.set("fill", "white").set("stroke", "#345")).add(text(
+            let outline = Rectangle::new().set("x", WIDTH / 2 + 40).set("y", y - 10).set("width", 46).set("height", 20);
+            drawing = drawing.add(outline.set("fill", "white").set("stroke", "#345")).add(text(
                 WIDTH / 2 + 63,
                 y + 5,
                 "middle",
-                RESISTOR,
+                resistor(wire.name),
             ));
         }
     }

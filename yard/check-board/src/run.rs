@@ -84,7 +84,7 @@ fn pulses(boards: &mut Boards, extent: Extent) -> Result<Vec<Figure>, CheckError
         servo::steady(&servo::pulses(&records, 0)).ok_or(CheckError::NoPulses)?;
     boards.clock_ratio = clock_ratio;
     Ok(vec![
-        Figure::new("clock_ratio", "the weeder's clock over the tester's", "", clock_ratio, 0.005).within(0.99..=1.01),
+        Figure::new("clock_ratio", "the weeder's clock over the tester's", "", clock_ratio, 0.02).within(0.99..=1.01),
         Figure::new("pulse_out_us", "pulse, tool out", "us", width_us, 1.0).within(1998.0..=2002.0),
         Figure::new("pulse_spread_us", "longest less shortest pulse", "us", width_spread_us, 0.5).within(..=1.0),
         Figure::new("frame_spread_us", "longest less shortest frame", "us", frame_spread_us, 0.5).within(..=1.0),
@@ -201,16 +201,17 @@ fn resets(boards: &mut Boards, extent: Extent) -> Result<Vec<Figure>, CheckError
     Ok(figures)
 }
 
-/// Tolerance of a swing's mean error against the simulation's, in counts. Where two zones nearly touch, a fraction of a
-/// count decides whether a run merges them. Single swings of 79 counts depend on that, and runs of the same firmware
-/// had means from 9.1 to 13.0.
-const SWING_MEAN_TOLERANCE: f64 = 6.0;
+/// Tolerances of a swing's mean and greatest error against the simulation's, in counts. Where two zones nearly touch, a
+/// fraction of a count decides whether a run merges them. Single swings of 79 counts depend on that, and runs of the
+/// same firmware had means from 9.1 to 13.0.
+const SWING_TOLERANCES: [f64; 2] = [6.0, 80.0];
 
 /// A row's figures.
 fn of_row(outcome: &Outcome, plants: usize, weeds: usize, speed: f64) -> Vec<Figure> {
     let Outcome { judgement, lost_counts } = outcome;
     let errors = || judgement.swing_errors_ticks().into_iter().map(f64::abs);
     let mean = errors().sum::<f64>() / errors().count().max(1) as f64;
+    let [of_mean, of_worst] = SWING_TOLERANCES;
     let id = |what: &str| format!("row_{speed}_{what}");
     let what = |what: &str| format!("row of {plants} plants and {weeds} weeds at {speed} km/h: {what}");
     let count = |id_part, words, value| Figure::count(id(id_part), what(words), value);
@@ -218,7 +219,13 @@ fn of_row(outcome: &Outcome, plants: usize, weeds: usize, speed: f64) -> Vec<Fig
         count("reached", "zones reached", judgement.reached() as f64).within(..=0.0),
         count("cut", "tall weeds cut", judgement.weeds.iter().filter(|weed| weed.cut).count() as f64),
         count("lost", "counts lost", lost_counts.abs() as f64).within(..=0.0),
-        Figure::new(id("swing_mean"), what("mean error of a swing"), "counts", mean, SWING_MEAN_TOLERANCE),
-        Figure::new(id("swing_worst"), what("largest error of a swing"), "counts", errors().fold(0.0, f64::max), 6.0),
+        Figure::new(id("swing_mean"), what("mean error of a swing"), "counts", mean, of_mean),
+        Figure::new(
+            id("swing_worst"),
+            what("largest error of a swing"),
+            "counts",
+            errors().fold(0.0, f64::max),
+            of_worst,
+        ),
     ]
 }

@@ -131,6 +131,8 @@ impl Board for Tester {
     }
 
     fn check_capture(&mut self, width: u16) {
+        // A wire that nothing drives may have stayed high.
+        self.lines.drive_capture(false);
         self.lines.drive_capture(true);
         let begin = self.now();
         while self.now().wrapping_sub(begin) < width.into() {}

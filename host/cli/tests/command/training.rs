@@ -144,6 +144,32 @@ fn detections_that_dumps_repeat_count_once() {
 }
 
 #[test]
+fn a_table_that_forgets_plants_and_lines_that_were_answered_otherwise_are_told() {
+    // Weeds and plants of nearly the same widths: few plants have room beside the weeds.
+    let detection = |n: i32| {
+        let (label, narrowest_mm) = if n % 2 == 0 { ("weed", 104) } else { ("plant", 112) };
+        let hold_mm = narrowest_mm + 19 * n % 17;
+        format!("278,{},300,{hold_mm},{},weed,{label}\n", 60 + 41 * n % 160, 339 + hold_mm)
+    };
+    let folder = TempDir::new().unwrap();
+    let lines: String = (0..24).map(detection).collect();
+    fs::write(folder.path().join("objects.csv"), HEADER.replace("label", "answer,label") + &lines).unwrap();
+    let output = weeder(folder.path(), &["train", "objects.csv", "--k", "3", "--max", "5"]);
+    let told = String::from_utf8_lossy(&output.stderr);
+    for said in ["The table leaves 12 plants more unknown", "The machine answered 12 of 24 otherwise"] {
+        assert!(output.status.success() && told.contains(said), "{told}");
+    }
+}
+
+#[test]
+fn a_training_that_takes_long_is_told() {
+    let line = |number: usize| format!("694,{number},226,250,573,{}\n", ["plant", "weed"][number % 2]);
+    let lines: String = (0..5001).map(line).collect();
+    let table = ["train", "objects.csv", "--beside", "--out", "table.rs"];
+    assert_not_taken(&lines, &table, "Learning from 5001 detections takes long");
+}
+
+#[test]
 fn a_class_that_no_detection_has_gets_no_share() {
     let folder = folder_with("694,300,226,116,439,weed\n");
     let output = weeder(folder.path(), &["classify", "objects.csv"]);

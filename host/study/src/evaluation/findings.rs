@@ -23,8 +23,8 @@ impl Analysis {
         findings.extend(self.incomplete());
         findings.extend(self.more_weeds());
         findings.extend(self.speeds_as_measured());
-        // Area, time, width or speed is wrong.
-        let is_hasty = |record: &PlotRecord| record.performance().field_efficiency_percent.is_some_and(|it| it > 100.0);
+        // Area, time, width or speed is wrong. Rounding alone takes a plot without a stop just above 100.
+        let is_hasty = |record: &PlotRecord| record.performance().field_efficiency_percent.is_some_and(|it| it > 100.5);
         if let Some(plots) = self.named(is_hasty) {
             findings.push(format!(
                 "{plots}: more ground was covered than speed and width allow (field efficiency above 100 %), so check area, time, width and speed."

@@ -46,6 +46,16 @@ fn a_plot_that_cannot_be_is_named_with_its_place_and_column() {
 }
 
 #[test]
+fn rounding_alone_is_not_more_ground_than_speed_and_width_allow() {
+    // In this time, 30 square metres are a field efficiency of 100 %.
+    let is_told = |area_m2| {
+        let plot = PlotRecord { area_m2: Some(area_m2), ..PLOT };
+        Analysis::of(vec![plot]).unwrap().findings().iter().any(|said| said.contains("more ground was covered"))
+    };
+    assert_eq!([30.0, 30.01, 31.0].map(is_told), [false, false, true]);
+}
+
+#[test]
 fn a_treatment_has_the_means_of_its_plots() {
     let second = PlotRecord { replication: 2, damaged: Some(3), ..PLOT };
     let slow = PlotRecord { speed_km_h: 1.0, ..PLOT };

@@ -9,7 +9,8 @@
 //!    the detection with the most others of its class around it that are mistreated too and have no example near.
 //! 3. **Filling up**: plants without an example near are unknown, which spares them. While there is room they are added
 //!    in the same order, and in any case until `k` examples can vote. Hart's rule is checked last. While that needs
-//!    more examples than there is room for, the last plant is left out. Without these plants, the table is refused.
+//!    more examples than there is room for, the last plant is left out. A table that is too large without these plants,
+//!    or has no plant at all, is refused.
 //!
 //! Among equals the first in the list is chosen.
 
@@ -58,7 +59,7 @@ pub fn edit(examples: &[Example<COUNT>]) -> Vec<usize> {
 /// indices, in the order of choice.
 ///
 /// # Errors
-/// If more are needed.
+/// If more are needed, or if the weeds leave no room for a plant.
 pub fn condense(examples: &[Example<COUNT>], edited: &[usize], k: u8, radius: u32, most: usize) -> Result<Vec<usize>> {
     let half = radius / 2;
     let other = if most < MOST_EXAMPLES { ", or choose a larger --max" } else { "" };
@@ -82,7 +83,10 @@ pub fn condense(examples: &[Example<COUNT>], edited: &[usize], k: u8, radius: u3
         table.extend(others.take(usize::from(k).saturating_sub(kept.len())));
         // A plant that is no longer a stranger can be outvoted by the weeds around it, and so can a weed.
         keep_most_needed(examples, edited, &mut table, usize::MAX, half, is_mistreated);
-        let checked = check_room(table.len().max(usize::from(k)), most, other);
+        // A machine without an example of a plant knows no crop.
+        let has_plant = table.iter().any(|&index| examples[index].label == label::PLANT);
+        let needed = if has_plant { table.len().max(usize::from(k)) } else { most + 1 };
+        let checked = check_room(needed, most, other);
         if checked.is_ok() || kept.len() == fewest {
             return checked.map(|()| table);
         }

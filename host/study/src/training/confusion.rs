@@ -52,6 +52,11 @@ impl Confusion {
         self.of(Kind::Weed, Class::Plant) + self.of(Kind::Weed, Class::Unknown)
     }
 
+    /// Plants that the machine would spare without knowing them.
+    pub fn plants_unknown(&self) -> usize {
+        self.of(Kind::Plant, Class::Unknown)
+    }
+
     /// Share of detections that the machine treats correctly, from 0 to 1. `None` without detections.
     pub fn accuracy(&self) -> Option<f64> {
         share(self.total() - self.plants_taken_for_weeds() - self.weeds_left(), self.total())
@@ -59,7 +64,7 @@ impl Confusion {
 
     /// The errors, worst first: plants cut, weeds spared, plants unknown.
     pub(super) fn harm(&self) -> (usize, usize, usize) {
-        (self.plants_taken_for_weeds(), self.weeds_left(), self.of(Kind::Plant, Class::Unknown))
+        (self.plants_taken_for_weeds(), self.weeds_left(), self.plants_unknown())
     }
 }
 
@@ -75,7 +80,7 @@ impl fmt::Display for Confusion {
         let errors = [
             ("Plants classified as weeds", Kind::Plant, self.plants_taken_for_weeds()),
             ("Weeds left standing", Kind::Weed, self.weeds_left()),
-            ("Plants spared unknown", Kind::Plant, self.of(Kind::Plant, Class::Unknown)),
+            ("Plants spared unknown", Kind::Plant, self.plants_unknown()),
         ];
         for (name, kind, part) in errors {
             let total = self.count(kind);

@@ -21,6 +21,9 @@ pub const COLUMNS: [&str; 5] = ["speed_mm_s", "spacing_mm", "delay_mm", "hold_mm
 /// The column of the label.
 pub const LABEL: &str = "label";
 
+/// The column of the machine's class: plant, weed or unknown. An unknown detection counts as a plant.
+const ANSWER: &str = "answer";
+
 /// Columns that may tell where a detection was. They keep detections with equal features apart.
 pub const PLACE: [&str; 2] = ["row", "position"];
 
@@ -66,6 +69,8 @@ pub struct ToLearn {
     pub repeated: usize,
     /// An error for each detection that has another label in an earlier line.
     pub contradictions: Vec<String>,
+    /// Number of labelled detections that the machine took for the other class. Spacings behind them are wrong.
+    pub misread: usize,
 }
 
 /// Reads detections of both classes from files that together make one table.
@@ -94,6 +99,8 @@ pub fn read_labelled(paths: &[PathBuf]) -> Result<ToLearn, FileError> {
             read.contradictions.push(line.error(format!("an earlier line has it as a {other}")).to_string());
         }
         labels.push(kind);
+        let answer = line.text(ANSWER);
+        read.misread += usize::from(!answer.is_empty() && (answer == "weed") != (kind == Kind::Weed));
         read.labelled.push(Labelled { features, kind });
     }
     let has = |kind: Kind| read.labelled.iter().any(|object: &Labelled| object.kind == kind);
