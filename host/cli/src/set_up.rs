@@ -11,7 +11,7 @@ mod state;
 use self::state::State;
 use crate::input::{self, Line};
 use crate::ports::Port;
-use anyhow::{Context, Error, Result, bail};
+use anyhow::{Context, Error, Result, ensure};
 use clap::Args;
 use control::alarm::Alarm;
 use files::{bounded_file, whole_file};
@@ -124,22 +124,6 @@ struct Guide {
 impl Guide {
     fn lead(mut self) -> Result<()> {
         say!("Enter takes what stands in [brackets], s leaves a step out, q stops.")?;
-        match settings::status(&mut self.link)? {
-            // A new board, or one that has lost its settings.
-            Status { alarm: Some(Alarm::SettingsLost), .. } => {
-                say!("The board has no saved settings: alarm 5-1 settings_lost. If a file has them, type q.")?;
-                say!("Then `weeder settings push FILE.toml` restores them.")?;
-                self.go("Save its present settings, and clear the alarm")?;
-                self.link.ask("save")?;
-                self.link.ask("clear")?;
-            }
-            Status { alarm: Some(alarm), .. } => {
-                let (name, advice) = (advice::name(alarm), advice::alarm(alarm));
-                bail!("the machine has the alarm {name}: {advice}. Clear it, by `weeder monitor`, then call this again")
-            }
-            Status { mode: Mode::Alarm, .. } => bail!("the machine has an alarm that this version does not know"),
-            _ => {}
-        }
         self.link.ask("events on")?;
         self.compare()?;
         let steps = steps();
@@ -172,6 +156,42 @@ impl Guide {
         self.summary(&steps)
     }
 
+    /// The next event of the machine, with its line. An alarm is shown and cleared first.
+    fn hear(&mut self) -> Result<Option<(EventLine, String)>> {
+        let Some(line) = self.link.next_line()? else { return Ok(None) };
+        let ConsoleLine::Event(event) = ConsoleLine::parse(&line) else { return Ok(None) };
+        if matches!(event, EventLine::Alarm { .. } | EventLine::Newer { is_alarm: true }) {
+            self.clear_alarm()?;
+        }
+        Ok(Some((event, line)))
+    }
+
+    /// Shows a latched alarm with its advice, and clears it if the user agrees.
+    fn clear_alarm(&mut self) -> Result<()> {
+        let Status { alarm, mode, .. } = settings::status(&mut self.link)?;
+        let Some(alarm) = alarm else {
+            ensure!(mode != Mode::Alarm, "the machine has an alarm that this version does not know");
+            return Ok(());
+        };
+        // Its own line would ask again.
+        while self.link.next_line()?.is_some() {}
+        // A new board, or one that has lost its settings.
+        if alarm == Alarm::SettingsLost {
+            say!("The board has no saved settings: alarm 5-1 settings_lost. If a file has them, type q.")?;
+            say!("Then `weeder settings push FILE.toml` restores them.")?;
+            self.go("Save its present settings, and clear the alarm")?;
+            self.link.ask("save")?;
+        } else {
+            say!("\n  alarm {}: {}", advice::name(alarm), advice::alarm(alarm))?;
+            match alarm {
+                Alarm::ToolStuck => self.set_end_switch("Clear the alarm, and use the end switch: on, off")?,
+                _ => self.go("Clear the alarm")?,
+            }
+        }
+        self.link.ask("clear")?;
+        Ok(())
+    }
+
     /// Why a step is open: the board's settings or the measurements show it.
     fn open(&mut self, tasks: &[Task]) -> Result<Option<String>> {
         Ok(self.state.measured.open(tasks, &settings::read(&mut self.link)?))
@@ -179,8 +199,11 @@ impl Guide {
 
     /// Compares the board's settings with those of the file. Steps whose settings differ are open again.
     fn compare(&mut self) -> Result<()> {
+        // An alarm's question may set and read a setting.
+        let kept = self.state.measured.settings.clone();
+        self.clear_alarm()?;
         let on_board = settings::read(&mut self.link)?;
-        let kept = std::mem::replace(&mut self.state.measured.settings, on_board.clone());
+        self.state.measured.settings.clone_from(&on_board);
         let differs = |&setting: &Setting| on_board.get(setting) != kept.get(setting);
         let differing: Vec<Setting> = Setting::all().filter(differs).collect();
         if differing.is_empty() || !self.path.exists() || self.state.done.is_empty() {
@@ -240,7 +263,7 @@ impl Guide {
         shown: Option<&str>,
         parse: impl Fn(&str) -> Result<T, String>,
     ) -> Result<T> {
-        loop {
+        'question: loop {
             // At a terminal, a line that was typed before the question is no answer to it.
             while io::stdin().is_terminal() && self.obey_typed()? {}
             let mut out = io::stdout().lock();
@@ -252,13 +275,11 @@ impl Guide {
                     Ok(typed) => break typed,
                     Err(TryRecvError::Disconnected) => return Err(Error::msg(End::Stop)),
                     // Waits a fiftieth of a second for a line of the machine.
-                    Err(TryRecvError::Empty) => {
-                        if let (Some(line), true) = (self.link.next_line()?, self.watches)
-                            && let ConsoleLine::Event(EventLine::Detection { .. }) = ConsoleLine::parse(&line)
-                        {
-                            say!("\n    {line}")?;
-                        }
-                    }
+                    Err(TryRecvError::Empty) => match self.hear()? {
+                        Some((EventLine::Alarm { .. }, _)) => continue 'question,
+                        Some((EventLine::Detection { .. }, line)) if self.watches => say!("\n    {line}")?,
+                        _ => {}
+                    },
                 }
             };
             let answer = match (typed.text.trim(), shown) {
@@ -284,6 +305,7 @@ impl Guide {
     }
 
     fn step(&mut self, tasks: &[Task]) -> Result<()> {
+        self.clear_alarm()?;
         if tasks.is_empty() {
             return self.watch();
         }
@@ -405,7 +427,8 @@ impl Guide {
     /// Asks for a setting's value. Enter takes the offered one, or else the present one.
     fn value(&mut self, setting: Setting, offered: Option<u16>) -> Result<u16> {
         let now = settings::read(&mut self.link)?.get(setting);
-        let mut question = format!("{} in {}", name(setting), unit(setting));
+        // A count has no unit.
+        let mut question = format!("{} in {}", name(setting), unit(setting)).trim_end_matches(" in ").to_owned();
         if offered.is_some_and(|offered| offered != now) {
             question += &format!(", now {now}");
         }
@@ -416,12 +439,13 @@ impl Guide {
         })
     }
 
-    /// Types a command. `None` if the machine refuses it; the reason was printed.
+    /// Types a command. `None` if the machine refuses it; the reason was printed, and an alarm cleared.
     fn ask(&mut self, command: &str) -> Result<Option<Vec<String>>> {
         match self.link.ask(command) {
             Ok(answer) => Ok(Some(answer)),
             Err(LinkError::Refused { answer, .. }) => {
                 tell!("  {answer}");
+                self.clear_alarm()?;
                 Ok(None)
             }
             Err(error) => Err(error.into()),

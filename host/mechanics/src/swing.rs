@@ -219,10 +219,11 @@ impl Swing {
     pub fn sentences(&self, machine: &Machine, torque: Torque) -> Vec<String> {
         let mut said = vec![
             format!(
-                "The tool clears a {} of {:.0} mm at {:.1} degrees, {} us of the pulse away from the row.",
+                "The tool clears a {} of {:.0} mm at {:.1} degrees, {:.0} mm aside, {} us of the pulse away from the row.",
                 if self.stem_zone_mm > 0 { "stem's zone" } else { "canopy" },
                 kept_mm(machine),
                 self.angle_degrees,
+                MM.value(machine.intra_row.shank_length) * self.angle_degrees.to_radians().sin(),
                 self.servo_out_us.abs_diff(self.servo_in_us)
             ),
             format!(

@@ -4,7 +4,7 @@ use super::{End, Guide};
 use anyhow::{Error, Result, bail};
 use frame::{say, tell};
 use link::settings::{self, Setting, name};
-use link::{ConsoleLine, EventLine, Status};
+use link::{EventLine, Mode, Status};
 use set_up::{SetUp, Step};
 use std::sync::mpsc::RecvTimeoutError;
 use std::thread;
@@ -27,19 +27,13 @@ const TYPED: Duration = Duration::from_millis(20);
 /// From this speed on, the machine ends timed swings: 0.05 km/h, rounded up.
 const ROLLS_MM_S: u32 = 15;
 
+const END_SWITCH: &str = "An end switch on D5 times the servo by itself: on, off";
+
 impl Guide {
     /// Times the servo until there are enough measurements over the present stroke.
     pub(super) fn time_servo(&mut self) -> Result<()> {
         self.push(&[])?;
-        let has_switch = settings::read(&mut self.link)?.get(Setting::EndSwitch) > 0;
-        let shown = if has_switch { "on" } else { "off" };
-        let question = "An end switch on D5 times the servo by itself: on, off";
-        let wanted = self.ask_for(question, Some(shown), |typed| match typed {
-            "on" => Ok(1),
-            "off" => Ok(0),
-            _ => Err("type on or off".to_owned()),
-        })?;
-        self.push(&[(Setting::EndSwitch, wanted)])?;
+        self.set_end_switch(END_SWITCH)?;
         loop {
             let settings = settings::read(&mut self.link)?;
             let missing = self.state.measured.missing(&settings);
@@ -60,9 +54,8 @@ impl Guide {
             let Some((event, line)) = self.swings(from)? else { continue };
             match event {
                 EventLine::NotCalibrated {} => {
-                    tell!(
-                        "  error: the end switch did not follow: see to it, or leave out this step and begin it with off"
-                    );
+                    tell!("  error: the end switch did not follow: see to it, or type off");
+                    self.set_end_switch(END_SWITCH)?;
                 }
                 EventLine::CalibratedBySwitch { out_ms, in_ms, is_set } => {
                     say!("  The tool was out after {out_ms} ms, and began to come back after {in_ms} ms.")?;
@@ -85,6 +78,18 @@ impl Guide {
         }
     }
 
+    /// Asks whether the end switch is in use.
+    pub(super) fn set_end_switch(&mut self, question: &str) -> Result<()> {
+        let has_switch = settings::read(&mut self.link)?.get(Setting::EndSwitch) > 0;
+        let shown = if has_switch { "on" } else { "off" };
+        let wanted = self.ask_for(question, Some(shown), |typed| match typed {
+            "on" => Ok(1),
+            "off" => Ok(0),
+            _ => Err("type on or off".to_owned()),
+        })?;
+        self.push(&[(Setting::EndSwitch, wanted)])
+    }
+
     /// Waits for the result of the timed swings. `None` if the machine has dropped them; the reason was printed.
     fn swings(&mut self, from: i32) -> Result<Option<(EventLine, String)>> {
         let calibrated = |event: &EventLine| {
@@ -96,11 +101,10 @@ impl Guide {
         while Instant::now() < deadline && !has_moved {
             let until = Instant::now() + POLL;
             while Instant::now() < until {
-                let Some(line) = self.link.next_line()? else { continue };
-                if let ConsoleLine::Event(event) = ConsoleLine::parse(&line)
-                    && calibrated(&event)
-                {
-                    return Ok(Some((event, line)));
+                match self.hear()? {
+                    Some((EventLine::Alarm { .. }, _)) => return Ok(None),
+                    Some((event, line)) if calibrated(&event) => return Ok(Some((event, line))),
+                    _ => {}
                 }
             }
             has_moved = settings::status(&mut self.link)?.speed_mm_s.unsigned_abs() >= ROLLS_MM_S;
@@ -118,7 +122,11 @@ impl Guide {
     fn stands_at(&mut self, from: Option<i32>) -> Result<i32> {
         let (since, mut before, mut is_told) = (Instant::now(), None, false);
         loop {
-            let Status { position, speed_mm_s, .. } = settings::status(&mut self.link)?;
+            let Status { position, speed_mm_s, mode, .. } = settings::status(&mut self.link)?;
+            if mode == Mode::Alarm {
+                self.clear_alarm()?;
+                continue;
+            }
             let has_rolled = from.is_none_or(|from| position.abs_diff(from) > ROLLED_TICKS);
             if has_rolled && speed_mm_s == 0 && before == Some(position) {
                 return Ok(position);
@@ -172,7 +180,9 @@ impl Guide {
                 if length == AGAIN {
                     continue 'stretches;
                 }
-                self.stands_at(Some(from))?;
+                if let Some(warning) = backward(from, self.stands_at(Some(from))?) {
+                    tell!("  Warning: {warning}");
+                }
                 let command = format!("calibrate {length}");
                 if let Some(answer) = self.ask(&command)? {
                     break (command, answer);
@@ -224,8 +234,7 @@ impl Guide {
         let deadline = Instant::now() + PLANTS;
         while Instant::now() < deadline {
             self.obey_typed()?;
-            let Some(line) = self.link.next_line()? else { continue };
-            if let ConsoleLine::Event(EventLine::Slip { permille }) = ConsoleLine::parse(&line) {
+            if let Some((EventLine::Slip { permille }, line)) = self.hear()? {
                 say!("  slip {permille} permille")?;
                 self.state.measured.take_line(&line);
                 return self.keep();
@@ -247,9 +256,22 @@ fn distance(typed: &str) -> Result<String, String> {
     if is_right { Ok(typed.to_owned()) } else { Err(right.to_owned()) }
 }
 
+/// A warning if the machine counted backward between these positions.
+fn backward(from: i32, to: i32) -> Option<&'static str> {
+    let warning = "the machine counted backward. If it rolled forward, swap D2 and D3 at the encoder";
+    (to.wrapping_sub(from) < 0).then_some(warning)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_stretch_that_is_counted_backward_has_a_warning_also_where_the_position_wraps() {
+        assert_eq!(backward(100, 19_000), None);
+        assert_eq!(backward(i32::MAX, i32::MIN + 19_000), None);
+        assert!(backward(100, -19_000).is_some_and(|warning| warning.contains("swap D2 and D3")));
+    }
 
     #[test]
     fn a_distance_is_a_whole_number_of_millimetres() {

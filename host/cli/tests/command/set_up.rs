@@ -1,5 +1,7 @@
 //! The manual's page on setting the machine up: its steps are safe, and lead there.
 
+mod alarms;
+
 use crate::common::said;
 use crate::typed::{printed, typed};
 use field::conditions::Conditions;
@@ -352,8 +354,8 @@ fn a_person_sets_the_virtual_uno_up_from_the_first_question_to_the_last() {
 fn without_a_machine_s_file_its_measures_are_asked_and_nothing_else_is_offered() {
     let folder = TempDir::new().expect("there is room for a folder");
     let (_uno, _) = uno(folder.path(), &["--stand", "--link", "uno"]);
-    // Step 2 with a beam that is too near at first.
-    let mut input = vec!["", "s", "", "300", "", "", "90", "s"];
+    // Step 2 with a beam that is too near at first, and with an encoder of 500 lines.
+    let mut input = vec!["", "s", "", "300", "", "", "", "2000", "90", "s"];
     // Step 5 by a person's own measures, one of them out of range at first.
     input.extend([
         "maybe", "", "", "300", "2.5", "40", "0.2", "800", "900", "80", "20", "15", "", "", "", "", "", "s", "s", "s",
@@ -380,6 +382,9 @@ fn without_a_machine_s_file_its_measures_are_asked_and_nothing_else_is_offered()
     assert!(printed.contains("it has to be a number from 0 to 200 mm"), "{printed}");
     assert!(printed.contains("need a beam_to_tool_mm of 389 or more"), "{printed}");
     assert!(printed.contains("error: type yes or no"), "{printed}");
+    for words in ["four times the encoder's lines", "  ticks_per_rev [2400]: ", "    ticks_per_rev 2000"] {
+        assert!(printed.contains(words), "{words:?} is not in\n{printed}");
+    }
     for words in ["Open: step 4, Fit a second beam: second_beam_mm is 0", "Open: step 8, Lower the margin: "] {
         assert!(printed.contains(words), "{words:?} is not in\n{printed}");
     }
@@ -462,23 +467,4 @@ fn a_wheel_that_does_not_turn_is_named_and_the_wait_for_it_can_be_ended() {
     for words in ["The machine has to roll farther: pos=0 speed_mm_s=0.", "Stopped. The same command continues here."] {
         assert!(ended.contains(words), "{words:?} is not in\n{ended}");
     }
-}
-
-#[test]
-fn only_a_board_without_settings_has_its_alarm_cleared_and_only_after_a_question() {
-    let folder = TempDir::new().expect("there is room for a folder");
-    let (_uno, _) = uno(folder.path(), &["--stand", "--no-reset", "--link", "uno"]);
-    let stopped = answered(folder.path(), &["q"]);
-    assert!(stopped.contains("alarm 5-1 settings_lost. If a file has them, type q."), "{stopped}");
-    let mut monitor = Command::new(env!("CARGO_BIN_EXE_weeder"));
-    monitor.current_dir(&folder).args(["monitor", "--plain", "--port", "./uno"]);
-    // The switch is open, and the tool is out: a stuck tool.
-    let lines = "status\nsave\nclear\nset end_switch on\nset lead_out_ms 10\n";
-    let said = typed(&mut monitor, lines).stdout;
-    assert!(String::from_utf8_lossy(&said).contains("code=5-1"), "the alarm has stayed");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
-    command.current_dir(&folder).args(["set-up", "--port", "./uno"]);
-    let output = typed(&mut command, String::new());
-    let why = String::from_utf8_lossy(&output.stderr);
-    assert!(!output.status.success() && why.contains("alarm 4-1 tool_stuck: stop;"), "{why}");
 }
