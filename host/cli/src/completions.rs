@@ -11,7 +11,7 @@ use frame::{print, program};
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
-  source <(weeder completions bash)    as a line of ~/.bashrc
+  eval \"$(weeder completions bash)\"    as a line of ~/.bashrc
   weeder completions zsh > ~/.zfunc/_weeder    if ~/.zfunc is in fpath before compinit
   weeder completions fish > ~/.config/fish/completions/weeder.fish
   weeder completions powershell | Out-String | Invoke-Expression    as a line of $PROFILE")]

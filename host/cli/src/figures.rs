@@ -6,10 +6,9 @@
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
-use files::whole_file;
+use files::{bounded_file, whole_file};
 use frame::{Finding, say, tell};
 use std::env;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -36,9 +35,10 @@ const MARK: &str = "<!-- figures: ";
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let mut differ = Vec::new();
     for path in &arguments.pages {
-        let page = fs::read_to_string(path).with_context(|| format!("{} cannot be read", path.display()))?;
+        let page = bounded_file::text(path)?;
         let renewed = renew(&page, path)?;
-        if renewed == page {
+        // Git for Windows may end the page's lines by CR LF.
+        if renewed.lines().eq(page.lines()) {
             continue;
         }
         if arguments.check {
@@ -104,6 +104,14 @@ mod tests {
     fn a_page_without_figures_stays_as_it_is() {
         let page = "# A page\n\n```text\nno figure\n```\n";
         assert_eq!(renew(page, Path::new("page.md")).expect("nothing is to be run"), page);
+    }
+
+    #[test]
+    fn a_page_with_other_line_ends_does_not_differ() {
+        let page = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(page.path(), "# A page\r\n\r\nwithout a last line end").unwrap();
+        let arguments = Arguments { pages: vec![page.path().to_owned()], check: true };
+        assert_eq!(run(&arguments).unwrap(), Finding::Good);
     }
 
     #[test]

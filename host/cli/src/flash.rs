@@ -6,17 +6,13 @@ mod bootloader;
 use self::bootloader::{ATMEGA328P, Heard, Signature, heard};
 use crate::bounds::Firmware;
 use crate::ports::Port;
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, ensure};
 use clap::Args;
 use frame::say;
 use link::Claim;
 use link::row_names::Board;
-use std::io;
-use std::path::{self, Path};
-use std::process::Command;
 use uno::bootloader::check_room;
 use uno::elf::Image;
-use uno_run::firmware;
 
 #[derive(Args)]
 #[command(after_help = "\
@@ -31,10 +27,6 @@ pub struct Arguments {
     /// Use the bootloader before optiboot, at 57600 baud: the Duemilanove's, and that of many Nano copies.
     #[arg(long)]
     old_bootloader: bool,
-    /// Use ravedude (Ravedude.toml) if it is installed and the bootloader is not the old one. If you interrupt ravedude,
-    /// half a firmware may run.
-    #[arg(long)]
-    ravedude: bool,
     #[command(flatten)]
     firmware: Firmware,
 }
@@ -81,8 +73,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             "This bootloader does not start the machine again after a stop by its watchdog. The tool then has no signal \
              until you switch the power off and on. Before work in a field, burn optiboot with the Arduino IDE."
         )?;
-    } else if arguments.ravedude && run_ravedude(&elf, &port)? {
-        return Ok(());
     }
     let (succeeded, signature) = avrdude::write(&flash, &port, bootloader.baud)?;
     ensure!(succeeded, "avrdude did not succeed: {}", why(&claim, &port, bootloader, other, signature));
@@ -140,22 +130,6 @@ fn other_chip(signature: Signature) -> String {
         "the board has another chip, {}: nothing was written. The firmware is for the Uno's ATmega328P",
         bootloader::chip(signature)
     )
-}
-
-/// Flashes an ELF with ravedude. Returns whether it is installed.
-fn run_ravedude(elf: &Path, port: &str) -> Result<bool> {
-    let elf = path::absolute(elf).with_context(|| format!("{} has no absolute path", elf.display()))?;
-    // Its settings lie in the workspace.
-    let mut command = Command::new("ravedude");
-    command.arg(elf).env("RAVEDUDE_PORT", port).current_dir(firmware::workspace_root());
-    match command.status() {
-        Ok(status) => {
-            ensure!(status.success(), "ravedude did not succeed: `weeder flash` does without it");
-            Ok(true)
-        }
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
-        Err(error) => Err(error).context("ravedude cannot be started"),
-    }
 }
 
 #[cfg(test)]

@@ -14,7 +14,7 @@ Example:
   weeder hex weeder.hex
 
 avrdude flashes the file. The Arduino IDE contains it. An older bootloader needs -b 57600.
-A board with a CH340 is at /dev/ttyUSB0. After an interruption, half a firmware may run.
+A board with a CH340 is at /dev/ttyUSB0. If interrupted, half a firmware may run: flash again.
 
   avrdude -c arduino -p atmega328p -D -b 115200 -P /dev/ttyACM0 -U flash:w:weeder.hex:i")]
 pub struct Arguments {

@@ -9,7 +9,7 @@ use frame::Finding;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 use study::shard::{self, Header};
 
@@ -33,43 +33,40 @@ pub struct Arguments {
 
 /// Puts them together and prints the result.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
-    let headers = arguments.parts.iter().map(|path| Ok((name(path), open(path)?.0)));
-    let headers: Vec<(String, Header)> = headers.collect::<Result<_>>()?;
-    shard::together(&headers, &part::program()?)?;
-    let (_, header) = headers.into_iter().next().context("no part is named")?;
     let Arguments { parts, shown } = arguments;
-    let Header { command, settings, .. } = header;
+    let parts = parts.iter().map(|path| open(path)).collect::<Result<Vec<_>>>()?;
+    let (headers, rests): (Vec<(String, Header)>, Vec<Vec<u8>>) = parts.into_iter().unzip();
+    shard::together(&headers, &part::program()?)?;
+    let Header { command, settings, .. } = headers.first().context("no part is named")?.1.clone();
     let these = format!("these are parts of a {command}");
     ensure!(!shown.brief || command == trial::COMMAND, "{these}: --brief is for parts of a trial");
     ensure!(shown.result.is_none() || command == sweep::COMMAND, "{these}: --result is for parts of a sweep");
     match command.as_str() {
-        trial::COMMAND => trial::merge(read(settings)?, outcomes(parts)?, shown),
-        sweep::COMMAND => sweep::merge(&read(settings)?, &outcomes(parts)?, shown).map(|()| Finding::Good),
+        trial::COMMAND => trial::merge(read(settings)?, outcomes(&headers, &rests)?, shown),
+        sweep::COMMAND => sweep::merge(&read(settings)?, &outcomes(&headers, &rests)?, shown).map(|()| Finding::Good),
         soak::COMMAND => {
             ensure!(shown.out.is_none(), "{these}, which writes no file: leave --out away");
-            soak::merge(&read(settings)?, outcomes(parts)?, shown.json)
+            soak::merge(&read(settings)?, outcomes(&headers, &rests)?, shown.json)
         }
         other => bail!("these are parts of `weeder {other}`, which this program does not know"),
     }
 }
 
-fn name(path: &Path) -> String {
-    path.display().to_string()
-}
-
-/// A part's header, and the rest of its file.
-fn open(path: &Path) -> Result<(Header, BufReader<File>)> {
-    let mut file = BufReader::new(File::open(path).with_context(|| format!("{} cannot be read", name(path)))?);
-    Ok((shard::read_header(&name(path), &mut file)?, file))
+/// A part's name and header, and the rest of its file, which is read once because it may be a pipe.
+fn open(path: &Path) -> Result<((String, Header), Vec<u8>)> {
+    let name = path.display().to_string();
+    let unread = || format!("{name} cannot be read");
+    let mut file = BufReader::new(File::open(path).with_context(unread)?);
+    let (header, mut rest) = (shard::read_header(&name, &mut file)?, Vec::new());
+    file.read_to_end(&mut rest).with_context(unread)?;
+    Ok(((name, header), rest))
 }
 
 /// All outcomes, in the order of an undivided study.
-fn outcomes<T: DeserializeOwned>(parts: &[PathBuf]) -> Result<Vec<T>> {
-    let read = |path: &PathBuf| {
-        let (header, mut file) = open(path)?;
-        shard::read_outcomes(&name(path), &header, &mut file)
-    };
-    Ok(shard::outcomes(parts.iter().map(read).collect::<Result<_>>()?))
+fn outcomes<T: DeserializeOwned>(headers: &[(String, Header)], rests: &[Vec<u8>]) -> Result<Vec<T>> {
+    let parts = headers.iter().zip(rests);
+    let read = parts.map(|((name, header), rest)| shard::read_outcomes(name, header, &mut &rest[..]));
+    Ok(shard::outcomes(read.collect::<Result<_>>()?))
 }
 
 fn read<T: DeserializeOwned>(settings: Value) -> Result<T> {

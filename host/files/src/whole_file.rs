@@ -41,6 +41,11 @@ pub fn check(path: &Path) -> io::Result<()> {
     } else if is_device(&path) {
         // Opening a pipe would disturb its reader. Its errors show when it is written.
         Ok(())
+    } else if let Err(error) = path.symlink_metadata()
+        && error.kind() != ErrorKind::NotFound
+    {
+        // The name itself, such as one that is too long.
+        Err(error)
     } else {
         temporary(&path).map(drop)
     }
@@ -126,6 +131,7 @@ mod tests {
         assert!(check(&folder.path().join("report.html")).is_ok());
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
         assert_eq!(check(folder.path()).unwrap_err().kind(), ErrorKind::IsADirectory);
+        assert!(check(&folder.path().join("n".repeat(300))).is_err(), "longer than a name can be");
         let error = check(&folder.path().join("no/such/file")).unwrap_err().to_string();
         assert!(error.starts_with("No such file or directory") && !error.contains("tmp"), "{error}");
         let written = write(&folder.path().join("no/such/file"), |to| to.write_all(b"text"));

@@ -17,7 +17,7 @@ use files::whole_file;
 use std::any::Any;
 use std::ffi::OsString;
 use std::fs;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::{self, Path, PathBuf};
 
 /// Endings of files that commands write. A folder's name hardly ends so.
@@ -68,7 +68,10 @@ impl From<OsString> for OutName {
 impl OutName {
     /// Checks that a file of this name can be written without losing a file.
     pub fn file(&self, replace: Replace) -> Result<OutFile> {
-        ensure!(!self.0.is_dir(), "{} is a folder: name a file", self.0.display());
+        // What ends in a separator names a folder, which may not exist yet.
+        let name = self.0.file_name().unwrap_or_default().as_encoded_bytes();
+        let names_file = self.0.as_os_str().as_encoded_bytes().ends_with(name);
+        ensure!(names_file && !self.0.is_dir(), "{} is a folder: name a file", self.0.display());
         replace.check(&self.0)?;
         whole_file::check(&self.0).with_context(|| cannot_be_written(&self.0))?;
         Ok(OutFile(self.0.clone()))
@@ -82,7 +85,9 @@ impl OutName {
         if !folder.exists() && ending.is_some_and(|ending| FILE_ENDINGS.contains(&ending)) {
             bail!("{} is named like a file: name a folder, for several files", folder.display());
         }
-        let there = folder.ancestors().find(|part| part.exists()).unwrap_or(Path::new("."));
+        // In a link to nothing, or below a name that is too long, no folder can be made.
+        let is_absent = |part: &Path| part.symlink_metadata().is_err_and(|error| error.kind() == ErrorKind::NotFound);
+        let there = folder.ancestors().find(|part| !is_absent(part)).unwrap_or(Path::new("."));
         whole_file::check_folder(there).with_context(|| cannot_be_written(folder))?;
         let names: Vec<String> = names.into_iter().map(Into::into).collect();
         for path in names.iter().map(|name| folder.join(name)) {
@@ -130,7 +135,8 @@ impl OutFolder {
 }
 
 /// Checks the files of a parsed command line. Fails, in words, if an output is also an input or another output, or if
-/// standard input is named twice. A `-` that is left names no file: a parser replaces it where standard input is read.
+/// standard input is named twice. A name may not be empty: a shell's variable may be unset. A `-` that is left names no
+/// file: a parser replaces it where standard input is read.
 pub(crate) fn check(words: &ArgMatches) -> Result<(), String> {
     if let Some((_, words)) = words.subcommand() {
         return check(words);
@@ -139,8 +145,8 @@ pub(crate) fn check(words: &ArgMatches) -> Result<(), String> {
     let field = field.filter(|field| Conditions::preset(field).is_none());
     let inputs: Vec<&Path> = values::<PathBuf>(words).map(PathBuf::as_path).chain(field.map(Path::new)).collect();
     let outputs: Vec<&Path> = values::<OutName>(words).map(OutName::path).collect();
-    if inputs.iter().chain(&outputs).any(|path| path.as_os_str() == "-") {
-        return Err("- is no file here: name one".to_owned());
+    if let Some(none) = inputs.iter().chain(&outputs).find(|path| ["", "-"].map(Path::new).contains(path)) {
+        return Err(format!("{none:?} is no file here: name one"));
     }
     if inputs.iter().filter(|path| path.as_os_str() == "/dev/stdin").count() > 1 {
         return Err("standard input is read once: name - once".to_owned());

@@ -108,7 +108,7 @@ fn a_row_that_no_machine_can_roll_along_is_refused_with_its_line() {
 
 /// `FILE` stands for the file in arguments.
 #[cfg(unix)]
-const READERS: [&str; 16] = [
+const READERS: [&str; 17] = [
     "evaluate FILE",
     "trial --field FILE",
     "sweep --x speed=1..2:1 --field FILE",
@@ -122,6 +122,7 @@ const READERS: [&str; 16] = [
     "replay FILE",
     "map FILE --out map.geojson",
     "merge FILE",
+    "figures --check FILE",
     "set-up --state FILE --port uno",
     "hex weeder.hex --elf FILE",
     "virtual-uno --stand --bootloader optiboot --eeprom FILE",

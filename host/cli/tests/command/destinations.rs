@@ -80,6 +80,26 @@ fn a_folder_is_no_file_and_a_file_is_no_folder() {
 }
 
 #[test]
+fn a_name_that_no_output_can_have_is_refused_before_the_work() {
+    let folder = tempfile::tempdir().unwrap();
+    std::os::unix::fs::symlink("nothing", folder.path().join("dangling")).unwrap();
+    for (arguments, kind) in WRITERS {
+        let (name, words, long) = match kind {
+            Kind::Folder => ("dangling".to_owned(), "dangling cannot be written: ", "n".repeat(300)),
+            // A log is opened before the work.
+            Kind::File("log.csv") => continue,
+            Kind::File(name) => (format!("{name}/"), "/ is a folder: name a file", "n".repeat(300) + name),
+        };
+        for (name, words) in [(&*name, words), (&*long, " cannot be written: File name too long")] {
+            let output = weeder(folder.path(), &[arguments, &[name]].concat());
+            let message = String::from_utf8_lossy(&output.stderr);
+            assert_eq!((output.status.code(), output.stdout.len()), (Some(2), 0), "{arguments:?}: {message}");
+            assert!(message.contains(words), "{arguments:?}: {message}");
+        }
+    }
+}
+
+#[test]
 fn a_folder_called_report_where_the_command_is_typed_keeps_it_from_nothing() {
     let folder = tempfile::tempdir().unwrap();
     fs::create_dir(folder.path().join("report")).unwrap();

@@ -219,7 +219,7 @@ fn an_elf_with_unproved_bounds_is_flashed_only_with_unproved() {
     let port = pty.path().to_str().expect("it is text");
     let out = folder.path().join("out.hex");
     let out_name = out.to_str().expect("it is text");
-    for words in [&["flash", "--port", port][..], &["flash", "--ravedude", "--port", port], &["hex", out_name]] {
+    for words in [&["flash", "--port", port][..], &["hex", out_name]] {
         let output = run(words);
         assert_refused(&output, "the bounds of ");
         assert_refused(&output, "--unproved writes it all the same");
@@ -293,33 +293,6 @@ fn a_busy_port_is_named_and_a_file_is_no_port() {
         let output = weeder().args(["flash", "--port"]).arg(path).output().unwrap();
         assert_refused(&output, why);
     }
-}
-
-#[test]
-fn ravedude_is_given_the_firmware_and_the_port_where_it_is_installed() {
-    let folder = tempfile::tempdir().unwrap();
-    let ravedude = folder.path().join("ravedude");
-    fs::write(&ravedude, "#!/bin/sh\nprintf '%s' \"$1 $RAVEDUDE_PORT\" > \"${0%/*}/called\"\ntest -f Ravedude.toml\n")
-        .unwrap();
-    fs::set_permissions(&ravedude, fs::Permissions::from_mode(0o755)).unwrap();
-    let pty = Pty::open().unwrap();
-    let elf = elf_of(folder.path(), 100);
-    let mut command = weeder();
-    command.args(["flash", "--unproved", "--ravedude", "--elf"]).arg(&elf).arg("--port").arg(pty.path());
-    let output = command.env("PATH", folder.path()).output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let called = fs::read_to_string(folder.path().join("called")).unwrap();
-    assert_eq!(called, format!("{} {}", elf.display(), pty.path().display()));
-}
-
-#[test]
-fn without_ravedude_avrdude_does_it() {
-    let folder = tempfile::tempdir().unwrap();
-    let pty = Pty::open().unwrap();
-    let elf = elf_of(folder.path(), 100);
-    let mut command = weeder();
-    command.args(["flash", "--unproved", "--ravedude", "--elf"]).arg(&elf).arg("--port").arg(pty.path());
-    assert_refused(&command.env("PATH", folder.path()).output().unwrap(), "avrdude cannot be started");
 }
 
 /// Flashes an ELF of 100 bytes with this script in avrdude's place.

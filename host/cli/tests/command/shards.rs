@@ -5,7 +5,7 @@ use crate::common::{SMALL, assert_refused, said, weeder};
 use model_test::is_thorough;
 use std::fs;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Stdio};
 use std::thread;
 use std::time::Duration;
 use tempfile::TempDir;
@@ -71,6 +71,19 @@ fn a_soak_in_four_shards_is_the_undivided_soak_to_the_byte() {
     let soak = ["soak", "--hours", "1", "--uno-minutes", uno_minutes, "--faults", "900"];
     assert_same(&soak, &[], &[]);
     assert_same(&["soak", "--hours", "1", "--uno-minutes", "0"], &["--json"], &[]);
+}
+
+#[test]
+fn a_part_that_comes_through_a_pipe_is_merged() {
+    let folder = folder();
+    let trial = [&TRIAL[..], &["--speeds", "1", "--spacings", "50"]].concat();
+    compute_parts(folder.path(), &trial, 2);
+    let mut merge = Command::new(env!("CARGO_BIN_EXE_weeder"));
+    merge.current_dir(folder.path()).args(["merge", "/dev/stdin", "2.part"]);
+    let mut cat = Command::new("cat").arg(folder.path().join("1.part")).stdout(Stdio::piped()).spawn().unwrap();
+    let merged = merge.stdin(cat.stdout.take().expect("it is piped")).output().unwrap();
+    cat.wait().unwrap();
+    assert_eq!(merged.stdout, weeder(folder.path(), &trial).stdout, "{}", String::from_utf8_lossy(&merged.stderr));
 }
 
 #[test]
