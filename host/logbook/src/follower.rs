@@ -68,22 +68,29 @@ impl InUse {
         self.unknown = Setting::all().collect();
     }
 
-    /// Takes a line of the machine. Returns false if it shows no setting, or a value that this version does not accept.
+    /// Takes a line of the machine. Returns false if it shows no setting, or a value that this version does not accept:
+    /// that setting is unknown then.
     pub fn show(&mut self, line: &str) -> bool {
         shown(line).is_some_and(|(setting, value)| {
             let is_taken = self.settings.set(setting, value).is_ok();
-            self.unknown.retain(|&unknown| !is_taken || unknown != setting);
+            self.know(setting, is_taken);
             is_taken
         })
+    }
+
+    fn know(&mut self, setting: Setting, is_known: bool) {
+        self.unknown.retain(|&unknown| unknown != setting);
+        self.unknown.extend((!is_known).then_some(setting));
     }
 
     /// Takes a command that the machine has carried out.
     pub fn carry_out(&mut self, &Command { action, setting, number, .. }: &Command) {
         match action {
             Action::Set => {
-                if self.settings.change(setting, number).is_ok() {
-                    let reset = setting.is_of_the_wheel().then_some(Setting::TicksPerM);
-                    self.unknown.retain(|&unknown| unknown != setting && Some(unknown) != reset);
+                let is_taken = self.settings.change(setting, number).is_ok();
+                self.know(setting, is_taken);
+                if setting.is_of_the_wheel() {
+                    self.know(Setting::TicksPerM, is_taken);
                 }
             }
             Action::Save => self.saved = self.is_known().then(|| self.settings.clone()),

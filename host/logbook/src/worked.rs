@@ -237,9 +237,16 @@ mod tests {
         let at_work = format!("1,status,{}\n2,status,{}\n", status("work", 0, 500), status("work", 700, 500));
         let lost = of(&format!("{HEAD}{at_work}9,lost,the cable\n"));
         assert_eq!((lost.len(), lost[0].distance_mm), (1, Some(700.0)));
-        let unknown = of(&format!("{HEAD}0,setting,ticks_per_m=0\n0,command,revert\n0,answer,ok\n{at_work}"));
-        assert_eq!(unknown.len(), 1);
-        assert_eq!((unknown[0].distance_mm, unknown[0].plants, unknown[0].speed_km_h()), (None, None, None));
+        for unknown in [
+            "0,command,revert\n0,answer,ok\n",
+            // An earlier version took it.
+            "0,setting,\"ticks_per_rev=500 from 100 to 10000, default 2400\"\n",
+            "0,command,set wheel_mm 900\n0,answer,error: hold first\n0,command,set wheel_mm 900\n0,answer,ok\n",
+        ] {
+            let unknown = of(&format!("{HEAD}0,setting,ticks_per_m=0\n{unknown}{at_work}"));
+            assert_eq!(unknown.len(), 1);
+            assert_eq!((unknown[0].distance_mm, unknown[0].plants, unknown[0].speed_km_h()), (None, None, None));
+        }
     }
 
     #[test]
