@@ -137,6 +137,24 @@ test("the buttons lead to each of several alarms at one position", async () => {
     await close(opened);
 });
 
+test("a finger moves the rows also in a browser that does not tell its movement", async () => {
+    const status = (ms: number) => `${ms},status,state=work tool=in pos=${ms} speed_mm_s=500 windows=0 unseen_mm=0`;
+    const lines = ["time_ms,kind,line", "0,connected,0.2.0", "0,setting,ticks_per_m=1000", status(0), status(9000)];
+    writeFileSync("build/files/finger.csv", `${lines.join("\n")}\n`);
+    const opened = await openLog("build/files/finger.csv");
+    await inView(opened.page, "log-place").fill("0");
+    await inView(opened.page, "log-rows").evaluate((rows) => {
+        // Their movementX is 0.
+        for (const [type, clientX] of [
+            ["pointerdown", 300],
+            ["pointermove", 200],
+        ] as const)
+            rows.dispatchEvent(new PointerEvent(type, { isPrimary: true, buttons: 1, clientX }));
+    });
+    assert(Number(await inView(opened.page, "log-place").inputValue()) > 0);
+    await close(opened);
+});
+
 /**
  * A log of this many hours as `weeder record` writes it: at 2.5 km/h, with a status ten times a second, a plant each
  * 0.3 m, its swings, and an alarm an hour.

@@ -1,4 +1,4 @@
-// The page as an app without a network, a newer page, and a firmware that differs from the page's.
+// The page as an app without a network, a newer page, a firmware that differs from the page's, and another Uno.
 
 import assert from "node:assert/strict";
 import { createHash } from "node:crypto";
@@ -221,5 +221,54 @@ test("an Uno with another firmware is told with what changes, and gets its setti
     assert.equal(await page.locator("#work-panel [data-setting=margin_mm]").inputValue(), "40");
     await part("state").filter({ hasText: "hold" }).waitFor();
     assert(await part("restore").isHidden());
+    await close(opened);
+});
+
+test("kept settings can be put back until the machine has saved them, with the calibration and the old gap", async (test) => {
+    const uno = await VirtualUno.start(test, "--elf", FIRMWARE, "--stand");
+    const opened = await open(browser, "work", PHONE, [uno]);
+    const { page } = opened;
+    const part = (name: string) => page.locator(`#view-work [data-part="${name}"]`);
+    const kept = { ticks_per_rev: 2400, wheel_mm: 410, ticks_per_m: 1862, merge_gap_ticks: 100 };
+    await page.evaluate((kept) => localStorage.setItem("weeder.settings", kept), JSON.stringify(Object.entries(kept)));
+    await page.getByRole("button", { name: "Connect an Uno" }).click();
+    for (const [at, line] of ["set ticks_per_m 1862", "save", "clear"].entries()) {
+        await part("typed").fill(line);
+        await page.locator("#work-panel").getByRole("button", { name: "Send" }).click();
+        await part("said").locator("div", { hasText: /^ok$/ }).nth(at).waitFor();
+    }
+    const again = async () => {
+        await page.getByRole("button", { name: "Disconnect" }).click();
+        await part("state").filter({ hasText: "no machine" }).waitFor();
+        await page.getByRole("button", { name: "Connect an Uno" }).click();
+        await part("state").filter({ hasText: "hold" }).waitFor();
+    };
+    // It has saved settings now, but not these.
+    await again();
+    await part("restore-go").click();
+    await part("restore-said")
+        .filter({ hasText: /^The settings of before are saved\.$/ })
+        .waitFor();
+    await again();
+    assert(await part("restore").isHidden());
+    for (const [name, value] of Object.entries({ wheel_mm: 410, ticks_per_m: 1862, merge_gap_mm: 54 }))
+        assert.equal(await page.locator(`#work-panel [data-setting=${name}]`).inputValue(), String(value), name);
+    await close(opened);
+});
+
+test("another Uno is not said to have restarted at work because the one before was at work", async (test) => {
+    const before = await VirtualUno.start(test, "--elf", FIRMWARE);
+    const other = await VirtualUno.start(test, "--elf", FIRMWARE, "--stand");
+    const opened = await open(browser, "work", PHONE, [before, other]);
+    const { page } = opened;
+    const part = (name: string) => page.locator(`#view-work [data-part="${name}"]`);
+    await page.getByRole("button", { name: "Connect an Uno" }).click();
+    await part("alarm-name").filter({ hasText: "settings_lost" }).waitFor();
+    for (const name of ["clear", "start"]) await part(name).click();
+    await part("state").filter({ hasText: "work" }).waitFor();
+    await page.getByRole("button", { name: "Disconnect" }).click();
+    await page.getByRole("button", { name: "Connect an Uno" }).click();
+    await part("alarm-name").filter({ hasText: "settings_lost" }).waitFor();
+    assert.match((await part("alarm-advice").textContent()) ?? "", /^Check get, /);
     await close(opened);
 });

@@ -460,6 +460,7 @@ test("the steps of the set-up take a value each, set and save it, and keep what 
     const steps = part(page, "set-up-steps");
     const beam = steps.locator("[data-step=beam_to_tool_mm]");
     assert.equal(await beam.inputValue(), "400");
+    assert.equal(await steps.getByLabel("ticks_per_rev", { exact: true }).inputValue(), "2400");
     const step = steps.locator("li").filter({ has: page.locator("[data-step=beam_to_tool_mm]") });
     await beam.fill("4000");
     await step.getByRole("button", { name: "Set and save" }).click();

@@ -29,10 +29,17 @@ export function save(settings: readonly Setting[], help: ReadonlyMap<string, str
     download("machine.toml", head + entries.join(""), "application/toml");
 }
 
+/** Converts the gap of 0.1.0, unless the present one is there. `value` is that of a setting. */
+export function renameOldGap(values: Map<string, number>, value: (name: string) => number): void {
+    const ticks = values.get(OLD_MERGE_GAP);
+    if (ticks !== undefined && !values.has("merge_gap_mm"))
+        values.set("merge_gap_mm", Math.min(1000, Math.round(ticks * tickMm(value))));
+    values.delete(OLD_MERGE_GAP);
+}
+
 /** The values that a file names, by the names of settings. Throws a SettingsFileError. */
 export function parse(text: string, settings: readonly Setting[]): Map<string, number> {
     const values = new Map<string, number>();
-    let oldMergeGap: number | undefined;
     for (const [index, line] of text.split(/\r?\n/).entries()) {
         if (/^\s*(#.*)?$/.test(line)) continue;
         const refuse = (problem: string) =>
@@ -41,7 +48,7 @@ export function parse(text: string, settings: readonly Setting[]): Map<string, n
         if (name === "") throw refuse(english("fileForm"));
         if (name === OLD_MERGE_GAP) {
             if (!/^\d{1,4}$/.test(word) || Number(word) > 2000) throw refuse(english("fileOldGap", { name }));
-            oldMergeGap = Number(word);
+            values.set(name, Number(word));
             continue;
         }
         const setting = settings.find((setting) => setting.name === name);
@@ -61,8 +68,7 @@ export function parse(text: string, settings: readonly Setting[]): Map<string, n
     }
     // Settings that the file does not name are the machine's.
     const value = (name: string) => values.get(name) ?? settings.find((setting) => setting.name === name)?.value ?? 0;
-    if (oldMergeGap !== undefined && !values.has("merge_gap_mm"))
-        values.set("merge_gap_mm", Math.min(1000, Math.round(oldMergeGap * tickMm(value))));
+    renameOldGap(values, value);
     if (values.size === 0) throw new SettingsFileError(english("fileEmpty"));
     return values;
 }

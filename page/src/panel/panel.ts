@@ -173,6 +173,7 @@ export class Panel {
 
     /** Forgets what was measured at another machine, typed for it and said about it. */
     forget(): void {
+        [this.machine.mode, this.machine.restarted] = [undefined, undefined];
         this.#setUp.forget();
         this.#settings.forget();
         this.#parts.write("teach-said", "");

@@ -145,7 +145,7 @@ export class SetUp {
         const names: string[] = [];
         const parts: HTMLElement[] = tasks.flatMap((task) => {
             if (task === "calibrate servo") return [does(say("swingSix"), () => this.ask(task), "swingsSix")];
-            const [, name, unit] = /^(\w+) = \d+ (\S+)$/.exec(task) ?? [];
+            const [, name, unit] = /^(\w+) = \d+ (\S*)$/.exec(task) ?? [];
             if (name === undefined) return /^[\w.]+ = /.test(task) ? [make("code", "", task)] : [];
             names.push(name);
             const input = make("input", "");
@@ -154,7 +154,7 @@ export class SetUp {
                 input.dataset.typed = "";
             });
             this.#inputs.set(name, input);
-            return [make("label", "", make("span", "", `${name} (${unit})`), input)];
+            return [make("label", "", make("span", "", unit ? `${name} (${unit})` : name), input)];
         });
         if (names.length > 0) parts.push(does(say("setAndSave"), () => this.#save(names), "isSavedNow"));
         return [...parts, said];

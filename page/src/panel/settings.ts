@@ -39,8 +39,11 @@ export class SettingsForm {
 
     /** Shows the present values. The operator's changes stay. */
     show(): void {
+        // With another wheel the machine drops its calibration: an equal one is sent again after the wheel.
+        const isOfWheel = (name: string) =>
+            name === "ticks_per_m" && (this.#wanted.has("wheel_mm") || this.#wanted.has("ticks_per_rev"));
         for (const { name, value } of this.machine.settings)
-            if (this.#wanted.get(name) === value) this.#wanted.delete(name);
+            if (this.#wanted.get(name) === value && !isOfWheel(name)) this.#wanted.delete(name);
         // A field that is being edited keeps its cursor.
         const focused =
             document.activeElement instanceof HTMLElement ? document.activeElement.dataset.setting : undefined;

@@ -4,7 +4,7 @@
 import { ask as askRust } from "../core.ts";
 import type { Parts } from "../dom.ts";
 import type { Happening } from "../link/session.ts";
-import { save } from "../link/settings_file.ts";
+import { renameOldGap, save } from "../link/settings_file.ts";
 import { chosen, keep } from "../preferences.ts";
 import { say } from "../words/words.ts";
 import type { Panel } from "./panel.ts";
@@ -36,10 +36,12 @@ export class Update {
     }
 
     take({ is }: Happening): void {
-        // Without saved ones, its firmware has another table, or none were ever saved.
-        const hasSaved = this.panel.machine.settings.some(({ saved }) => saved !== undefined);
-        if (is === "connected" && this.#changes().isOwn && hasSaved) keep(KEPT, "");
-        if (is === "connected") this.parts.write("restore-said", "");
+        if (is === "connected") {
+            const kept = this.#kept();
+            const lacks = this.panel.machine.settings.some(({ name, saved }) => saved !== (kept.get(name) ?? saved));
+            if (this.#changes().isOwn && !lacks) keep(KEPT, "");
+            this.parts.write("restore-said", "");
+        }
         if (["connected", "lost", "settings", "event"].includes(is)) this.#show();
     }
 
@@ -52,9 +54,11 @@ export class Update {
         return { gone, added, isOwn: version === this.#version && gone.length + added.length === 0 };
     }
 
-    /** The stored settings that differ from the machine's. */
-    #kept(): [string, number][] {
-        return JSON.parse(chosen(KEPT) || "[]");
+    /** The stored settings, until the machine has saved them. */
+    #kept(): Map<string, number> {
+        const kept = new Map<string, number>(JSON.parse(chosen(KEPT) || "[]"));
+        renameOldGap(kept, (name) => kept.get(name) ?? 0);
+        return kept;
     }
 
     #show(): void {
@@ -72,11 +76,11 @@ export class Update {
             ];
             this.parts.say("update-said", () => said().filter(Boolean).join(" "));
         }
-        this.parts.html("restore").hidden = version === undefined || isOther || this.#kept().length === 0;
+        this.parts.html("restore").hidden = version === undefined || isOther || this.#kept().size === 0;
     }
 
     async #putBack(): Promise<void> {
-        const values = new Map(this.#kept());
+        const values = this.#kept();
         const unknown = [...values.keys()].filter((name) => !this.#own.settings.includes(name));
         for (const name of unknown) values.delete(name);
         if (!(await this.panel.putBack(values))) {

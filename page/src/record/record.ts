@@ -88,10 +88,15 @@ export class RecordView {
             },
             { passive: false },
         );
-        rows.addEventListener("pointermove", (event) => {
-            if (event.buttons !== 1) return;
-            this.#go(this.#middleMm - (event.movementX / Math.max(rows.clientWidth, 1)) * this.#windowMm);
-        });
+        // Not every browser has `movementX`, or counts it in these pixels.
+        let lastX = 0;
+        for (const type of ["pointerdown", "pointermove"] as const)
+            rows.addEventListener(type, ({ isPrimary, buttons, clientX }) => {
+                if (!isPrimary) return;
+                const byX = (clientX - lastX) / Math.max(rows.clientWidth, 1);
+                if (type === "pointermove" && buttons === 1) this.#go(this.#middleMm - byX * this.#windowMm);
+                lastX = clientX;
+            });
         onLanguage(() => this.#draw());
     }
 

@@ -286,7 +286,8 @@ export const words = {
     wasHidden: "This tab was hidden meanwhile: keep it in front, and flash it again first.",
     withoutSerial: "Without Web Serial",
     withoutSerialHow: "Save the HEX as a file. avrdude, which the Arduino IDE brings along, writes it:",
-    portIs: "PORT is COM3 or the like on Windows, /dev/ttyACM0 or /dev/ttyUSB0 on Linux. Old bootloaders speak at 57600.",
+    portIs:
+        "PORT is COM3 or the like on Windows, /dev/ttyACM0 or /dev/ttyUSB0 on Linux, /dev/cu.usb... on a Mac. Old bootloaders speak at 57600.",
 
     // Looking at a log.
     record: "Log",
@@ -372,7 +373,7 @@ export const heard = {
     nothingAnswers: "nothing answers at this port: choose another, or press the Uno's reset; flash a new board first",
     noText: "this port sends no text: choose another; on an Uno check that D0 and D1 are free, and flash it again",
     otherDevice:
-        "it is not the weeder's firmware that answers, but \u201c{text}\u201d: choose another port, or flash this one",
+        'it is not the weeder\'s firmware that answers, but "{text}": choose another port, or flash this one',
     servedSilent:
         "the computer that has the machine's port does not answer: see that this device is in its network, and that weeder serve runs there",
     servedOther: "the computer has started weeder serve again: save the log, then load this page again",
@@ -403,7 +404,7 @@ export const heard = {
     readsBack:
         "byte {at} reads back as {found}, and {written} was written: flash it again; where it stays so, see to the cable and the supply, else the chip's flash is worn out",
     firmwareAnswers:
-        "the weeder's firmware answers, and no bootloader: the reset did not reach it, or the board has none. Choose {other}, or press the board's reset at the moment at which you press the button here. A board without a bootloader is given one by the Arduino IDE and a programmer.",
+        "the weeder's firmware answers, and no bootloader: the reset did not reach it, or the board has none. Choose {other}, or press the board's reset as soon as you have chosen the port. A board without a bootloader is given one by the Arduino IDE and a programmer.",
     deviceAnswers:
         "something else answers at this port: \u201c{text}\u201d. Choose the Uno's port; where it is the Uno's, choose {other}.",
     noBootloader:
@@ -444,7 +445,7 @@ export const heard = {
     contradictSecondBeam:
         "a second beam stands 72 mm or more behind the first and ahead of the tool, and beam_to_tool_mm is 1000 at most: change second_beam_mm or beam_to_tool_mm",
     contradictEncoder:
-        "a wheel has to give 900 ticks a metre or more, or a failing encoder is found too late: ticks_per_m, and the value from ticks_per_rev and wheel_mm, must reach that; take an encoder with more counts",
+        "a wheel has to give 900 ticks a metre or more, or a failing encoder is found too late: ticks_per_m, and the value from ticks_per_rev and wheel_mm, must reach that; ticks_per_rev is four times the encoder's lines",
     contradictBeam:
         "margin_mm, lead_out_ms, beam_response_ms and top_speed_mm_s together need a beam_to_tool_mm of {needed} or more: raise it, or lower one of them",
 
