@@ -163,7 +163,9 @@ impl Logs {
     /// Says what is in them, and fails if one could not be written.
     fn end(&self) -> Result<()> {
         for Log { path, writer, .. } in &self.0 {
-            tell!("{} lines were added: {} has {} now", writer.added, path.display(), writer.lines());
+            let path_shown = path.display();
+            tell!("{} lines were added: {path_shown} has {} now", writer.added, writer.lines());
+            ensure!(path.exists(), "{path_shown} is gone: it was moved or deleted during the record");
         }
         self.check()
     }

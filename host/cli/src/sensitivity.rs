@@ -40,7 +40,7 @@ Examples:
   weeder sensitivity
   weeder sensitivity --field straight driving.steering_mm=5 driving.steering_mm=10
   weeder sensitivity sensors.unseen_percent=2,guard_spacing_mm=500,guard_scatter_mm=40    two settings belong together
-`weeder sweep --help` lists the names.")]
+`weeder sweep --help` lists the names. Speed and spacing are options here.")]
 pub struct Arguments {
     /// The changes, each tried by itself. The guard of 500 mm is for plants 50 cm apart.
     #[arg(value_name = "NAME=VALUE[,NAME=VALUE]", default_values = CHANGES)]

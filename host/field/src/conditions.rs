@@ -67,7 +67,14 @@ impl Conditions {
                 let problem = format!("is none of the presets ({presets}), and as a file it cannot be read{meant}");
                 Err(FileError::unusable(path, problem, source))
             }
-            read => Self::parse(path, &read?),
+            read => {
+                let text = read?;
+                if text.trim().is_empty() {
+                    // Such as the output of a command that failed.
+                    return Err(FileError::at_byte(path, &text, 0, "the file is empty: name a preset instead"));
+                }
+                Self::parse(path, &text)
+            }
         }
     }
 

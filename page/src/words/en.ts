@@ -286,8 +286,7 @@ export const words = {
     wasHidden: "This tab was hidden meanwhile: keep it in front, and flash it again first.",
     withoutSerial: "Without Web Serial",
     withoutSerialHow: "Save the HEX as a file. avrdude, which the Arduino IDE brings along, writes it:",
-    portIs:
-        "PORT is COM3 or the like on Windows, /dev/ttyACM0 or /dev/ttyUSB0 on Linux, /dev/cu.usb... on a Mac. Old bootloaders speak at 57600.",
+    portIs: "PORT is COM3 or the like on Windows, /dev/ttyACM0 or /dev/ttyUSB0 on Linux, /dev/cu.usb... on a Mac. Old bootloaders speak at 57600.",
 
     // Looking at a log.
     record: "Log",
@@ -372,8 +371,7 @@ export const heard = {
     resetWhileAsked: "the Uno was reset while it was asked `{command}`: see to its supply, then try again",
     nothingAnswers: "nothing answers at this port: choose another, or press the Uno's reset; flash a new board first",
     noText: "this port sends no text: choose another; on an Uno check that D0 and D1 are free, and flash it again",
-    otherDevice:
-        'it is not the weeder\'s firmware that answers, but "{text}": choose another port, or flash this one',
+    otherDevice: 'it is not the weeder\'s firmware that answers, but "{text}": choose another port, or flash this one',
     servedSilent:
         "the computer that has the machine's port does not answer: see that this device is in its network, and that weeder serve runs there",
     servedOther: "the computer has started weeder serve again: save the log, then load this page again",

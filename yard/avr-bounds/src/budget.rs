@@ -81,9 +81,12 @@ impl Budgets {
     /// Reads them from a TOML file.
     ///
     /// # Errors
-    /// If it cannot be read, or says what is not known.
+    /// If it cannot be read, is empty, or says what is not known.
     pub fn read(path: &Path) -> Result<Budgets, BoundsError> {
         let text = file::toml(path)?;
+        if text.trim().is_empty() {
+            return Err(BoundsError(format!("{} is empty, so it has no budget", path.display())));
+        }
         toml::from_str(&text).map_err(|error| {
             let line = error.span().map_or(1, |span| 1 + text[..span.start].matches('\n').count());
             let problem = error.message().trim().replace('\n', ", ");
