@@ -29,4 +29,6 @@ test("a merge gap in ticks, as older files have it, is read in millimetres", () 
     assert.equal(gap("ticks_per_m = 500\nmerge_gap_ticks = 2000"), 1000);
     assert.equal(gap("merge_gap_ticks = 40\nmerge_gap_mm = 5"), 5);
     assert.throws(() => gap("merge_gap_ticks = 2001"), SettingsFileError);
+    const older = [...SETTINGS, setting("merge_gap_ticks", 40, 2000)];
+    assert.deepEqual([...parse("merge_gap_ticks = 60", older)], [["merge_gap_ticks", 60]]);
 });

@@ -18,7 +18,7 @@ const REPORT: &str = "report.html";
     weeder evaluate trial.csv --out report      also write report/report.html, with plots\n  \
     weeder evaluate trial.csv --speeds 1,1.5,2,2.5   the table has measured speeds\n  \
     weeder evaluate trial.csv --log row.csv     speed, time, plants and area come from the machine's log\n  \
-    weeder evaluate trial.csv --json | jq .responses[0].model.terms")]
+    weeder evaluate trial.csv --json | jq '.responses[0].model.terms'")]
 pub struct Arguments {
     /// CSV file with a line for each plot: replication, speed_km_h, spacing_cm, weeds_before, weeds_after, plants, damaged,
     /// area_m2, time_s, width_m, power_hp; - for standard input.

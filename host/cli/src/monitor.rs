@@ -25,14 +25,15 @@ Keys:\n  \
     Esc                  HOLD to every row; drops the line that you are typing\n  \
     Page Up, Page Down   earlier lines, later lines; with several rows Ctrl-Up, Ctrl-Down\n  \
     Page Up, Page Down   with several rows: select the row for commands, or all\n  \
+    Shift-fn-Up, -Down   Page Up and Page Down in the Terminal of a Mac\n  \
     Tab, Up, Down        complete, recall earlier lines\n  \
     Ctrl-U, Ctrl-C       clear the line, end\n\
 HOLD is no emergency stop: that one cuts the power.\n\nExamples:\n  \
-    weeder monitor                                     watch the only Uno, and type commands\n  \
-    weeder monitor --log row.csv                       also keep a log, for `weeder replay`\n  \
-    weeder monitor --all                               every row of a machine at a glance\n  \
-    echo status | weeder monitor --plain               from a script; status 1 if refused, 2 if not sent\n  \
-    echo left: status | weeder monitor --plain --all   to one row; without a name, to all")]
+    weeder monitor                                       watch the only Uno, and type commands\n  \
+    weeder monitor --log row.csv                         also keep a log, for `weeder replay`\n  \
+    weeder monitor --all                                 every row of a machine at a glance\n  \
+    echo status | weeder monitor --plain                 from a script; status 1 if refused, 2 if not sent\n  \
+    echo \"left: status\" | weeder monitor --plain --all   to one row; without a name, to all")]
 pub struct Arguments {
     #[command(flatten)]
     ports: Ports,
@@ -45,7 +46,7 @@ pub struct Arguments {
 }
 
 /// Parses a typed line: the row before a colon, or `all`, and the command. Without a row it goes to `chosen`. `None` is
-/// all rows. Fails if there is no such row, or the rest is no command; in words.
+/// all rows. Fails if there is no such row, or the rest is missing or no command; in words.
 fn addressed<'a>(line: &'a str, names: &[String], chosen: Option<usize>) -> Result<(Option<usize>, &'a str), String> {
     // A colon behind `hold` is punctuation, not the end of a row's name.
     if link::is_hold(line) {
@@ -53,6 +54,10 @@ fn addressed<'a>(line: &'a str, names: &[String], chosen: Option<usize>) -> Resu
     }
     let row = |name: &str| if name.eq_ignore_ascii_case(ALL) { Ok(None) } else { find(name, names).map(Some) };
     let (to, command) = match line.split_once(':').map(|(name, command)| (row(name.trim()), command.trim())) {
+        Some((Ok(_), "")) => {
+            let name = line.trim();
+            return Err(format!("{name:?} has no command: write both in one line, as in \"{name} status\""));
+        }
         Some((Ok(to), command)) => (to, command),
         Some((Err(why), _)) if names.len() > 1 => return Err(why),
         _ => (chosen, line.trim()),

@@ -20,7 +20,7 @@ pub const COMMAND: &str = "soak";
 Examples:
   weeder soak                                        a day of the decisions, half an hour of the firmware
   weeder soak --hours 0 --uno-minutes 6 --faults 900    only the firmware, a fault every 4 s
-  weeder soak --hours 1 --uno-minutes 0 --json | jq .parts[0].alarms
+  weeder soak --hours 1 --uno-minutes 0 --json | jq '.parts[0].alarms'
   weeder soak --hours 240 --shard 2/4 --out 2.part   the second of four parts, for `weeder merge`
 The status is 1 if a plant was harmed, or another rule was broken.")]
 pub struct Arguments {

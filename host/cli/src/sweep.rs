@@ -32,7 +32,7 @@ Examples:
   weeder sweep --x ground.slip_percent=0..15:1 --speed 2 --result in_row_weeding
   weeder sweep --controller paper --x speed=0.5..3:0.5 --y crop.protected_mm=60..140:20
   weeder sweep --x margin_mm=0..100:10 --y machine.load_kg_cm=0..40:10 --out margin.csv
-  weeder sweep --x k=1..9:2 --json | jq .points[].plant_damage
+  weeder sweep --x k=1..9:2 --json | jq '.points[].plant_damage'
   weeder sweep --x k=1..9:2 --shard 2/4 --out 2.part      the second of four parts, for `weeder merge`
 An axis is `speed` in km/h, `spacing` in cm, a parameter of the field as in its TOML file, or a setting of the firmware.";
 

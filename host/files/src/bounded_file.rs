@@ -24,7 +24,7 @@ const MOST_NESTED: usize = 40;
 pub fn text(path: &Path) -> Result<String, FileError> {
     let bytes = bytes(path)?;
     if bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]) {
-        let problem = "saved as UTF-16: save it as UTF-8".to_owned();
+        let problem = "saved as UTF-16: save it as UTF-8, in PowerShell by `| Out-File -Encoding utf8 FILE`".to_owned();
         return Err(FileError::Line { path: path.into(), line: 0, problem });
     }
     let text = String::from_utf8(bytes).map_err(|error| {
@@ -122,7 +122,7 @@ mod tests {
             text(&path).unwrap_err().to_string()
         };
         assert!(text(folder.path()).unwrap_err().to_string().contains("is a folder"));
-        assert!(refused(b"\xFF\xFEk\0").contains("saved as UTF-16"));
+        assert!(refused(b"\xFF\xFEk\0").contains("saved as UTF-16: save it as UTF-8, in PowerShell by"));
         assert!(refused(b"k = 3\nm = \"\xE4\"").contains("line 2: this is no UTF-8"));
         assert!(refused(&vec![b' '; (16 << 20) + 1]).contains("longer than 16 MiB"));
         std::fs::write(folder.path().join("bom"), "\u{feff}k = 3").unwrap();

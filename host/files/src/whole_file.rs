@@ -47,6 +47,11 @@ pub fn check(path: &Path) -> io::Result<()> {
         // The name itself, such as one that is too long.
         Err(error)
     } else {
+        // A file that another program has open cannot be replaced. The rights are DELETE and GENERIC_WRITE.
+        #[cfg(windows)]
+        if path.is_file() {
+            std::os::windows::fs::OpenOptionsExt::access_mode(&mut OpenOptions::new(), 0x4001_0000).open(&path)?;
+        }
         temporary(&path).map(drop)
     }
 }

@@ -93,6 +93,9 @@ impl OutName {
         for path in names.iter().map(|name| folder.join(name)) {
             ensure!(!path.is_dir(), "{} is a folder, and a file would take its place", path.display());
             replace.check(&path)?;
+            if path.exists() {
+                whole_file::check(&path).with_context(|| cannot_be_written(&path))?;
+            }
         }
         Ok(OutFolder { folder: folder.clone(), names })
     }

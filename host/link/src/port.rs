@@ -87,8 +87,11 @@ fn is_name_of(one: &str, other: &str, ignores_case: bool) -> bool {
     one == other || ignores_case && one.eq_ignore_ascii_case(other)
 }
 
-/// The path of a port that a link may lead to.
+/// The path of a port that a link may lead to. On Windows no link leads to a port, and the search would open it.
 fn resolved(port: &str) -> String {
+    if cfg!(windows) {
+        return port.to_owned();
+    }
     std::fs::canonicalize(port).map_or_else(|_| port.to_owned(), |path| path.display().to_string())
 }
 
@@ -204,8 +207,8 @@ pub struct Claim {
 /// If another program has claimed it.
 pub fn claim(name: &str) -> Result<Claim, LinkError> {
     let path = lock_of(name);
-    // Another user's file can be locked, but not written.
-    let lock = File::options().create(true).append(true).open(&path).or_else(|_| File::open(&path));
+    // Another user's file can be locked, but not written. Windows locks no file that is only appended to.
+    let lock = File::options().read(true).create(true).append(true).open(&path).or_else(|_| File::open(&path));
     let not_locked = |source| LinkError::NotClaimed { path: path.clone(), source };
     let lock = lock.map_err(not_locked)?;
     // Other users lock it too, so the mode does not follow the umask. Setting it fails if the file is another user's.
@@ -262,10 +265,10 @@ fn explain(
     listed: impl FnOnce() -> Result<Vec<SerialPortInfo>, LinkError>,
 ) -> LinkError {
     let name = name.to_owned();
-    // The file system of Windows has no ports. Its list also has those in use.
+    // The list also has ports in use. It comes first: on Windows, a look for the file would open the port.
     let exists = || {
-        std::fs::exists(&name).unwrap_or(false)
-            || listed().is_ok_and(|ports| ports.iter().any(|port| is_same(&port.port_name, &name)))
+        listed().is_ok_and(|ports| ports.iter().any(|port| is_same(&port.port_name, &name)))
+            || std::fs::exists(&name).unwrap_or(false)
     };
     match error.kind() {
         ErrorKind::Io(io::ErrorKind::PermissionDenied) => LinkError::Forbidden(name),
@@ -358,6 +361,7 @@ pub(super) mod tests {
         std::fs::write(&port, "").unwrap();
         let port = port.to_str().unwrap();
         let claimed = claim(port).unwrap();
+        assert_eq!((&claimed._lock).read(&mut [0]).unwrap(), 0, "Windows locks no file that is only appended to");
         for error in [claim(port).unwrap_err(), try_port(port).unwrap_err()] {
             assert!(error.to_string().contains("is being flashed"), "{error}");
         }

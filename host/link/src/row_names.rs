@@ -154,9 +154,15 @@ fn numbered(number: &str, ports: &[SerialPortInfo]) -> Result<String, LinkError>
 
 fn serial_number(port: &SerialPortInfo) -> Option<&str> {
     match &port.port_type {
-        SerialPortType::UsbPort(usb) => usb.serial_number.as_deref().map(str::trim).filter(|number| !number.is_empty()),
+        SerialPortType::UsbPort(usb) => usb.serial_number.as_deref().and_then(|number| own(number, cfg!(windows))),
         _ => None,
     }
+}
+
+/// The serial number, if it is the board's own. Windows makes one up for a board without: a digit or two in serialport
+/// (its issue 203), which other boards have too.
+fn own(number: &str, on_windows: bool) -> Option<&str> {
+    Some(number.trim()).filter(|number| number.len() > if on_windows { 2 } else { 0 })
 }
 
 /// How to identify the board at a port. `by_place` is the folder with links by socket.
@@ -362,6 +368,14 @@ mod tests {
         assert_eq!([&before, &after].map(|ports| numbered("A1", ports).unwrap()), ["/dev/ttyACM0", "/dev/ttyACM1"]);
         let error = numbered("C3", &after).unwrap_err().to_string();
         assert!(error.starts_with("the board with the serial number C3 is not plugged in"), "{error}");
+    }
+
+    #[test]
+    fn a_number_that_windows_makes_up_is_no_board_s_own() {
+        for (number, elsewhere, on_windows) in [("5", Some("5"), None), ("1A", Some("1A"), None), (" ", None, None)] {
+            assert_eq!([own(number, false), own(number, true)], [elsewhere, on_windows]);
+        }
+        assert_eq!([false, true].map(|on_windows| own(" 85735 ", on_windows)), [Some("85735"); 2]);
     }
 
     #[cfg(unix)]

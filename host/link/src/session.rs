@@ -29,7 +29,7 @@ mod introduction;
 pub use self::happening::{Happening, Turn, Unanswered};
 pub(crate) use self::introduction::silence;
 
-use self::happening::UNTIL_HOLD;
+use self::happening::{UNTIL_HOLD, named_warning};
 use self::introduction::{INTRODUCTION, Introduction};
 use super::moment::Moment;
 use super::settings::Shown;
@@ -454,8 +454,9 @@ impl Session {
             ConsoleLine::Status(status) if is_own && self.state == State::Ready => {
                 return self.report(Happening::Status(status, line));
             }
-            ConsoleLine::Counts(counts) if is_own && self.state == State::Ready => {
-                return self.take_named(counts.warning);
+            // The counts, which earlier versions have fewer of.
+            _ if is_own && self.state == State::Ready && line.starts_with("lost=") => {
+                return self.take_named(named_warning(&line));
             }
             _ => return asked.answer.extend(is_own.then_some(line)),
         };

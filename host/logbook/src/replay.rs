@@ -37,7 +37,7 @@ use self::stretch::{Happened, Stretch};
 use super::log::{Entry, Kind};
 use control::say::command::Action;
 use link::EventLine;
-use link::settings::Setting;
+use link::settings::{self, Setting};
 use std::fmt;
 use thiserror::Error;
 
@@ -123,6 +123,9 @@ pub fn replay_with(log: &[Entry], mut tell: impl FnMut(f64)) -> Result<Replayed,
     let mut stretches = 0;
     let mut rest = log;
     while let Some(start) = rest.iter().position(|entry| entry.kind == Kind::Connected) {
+        if let Some(said) = settings::other_version(&rest[start].text, &[]) {
+            replayed.notes.push(format!("line {}: {said}. It may decide otherwise", rest[start].number));
+        }
         rest = &rest[start + 1..];
         let end =
             rest.iter().position(|entry| matches!(entry.kind, Kind::Connected | Kind::Lost)).unwrap_or(rest.len());

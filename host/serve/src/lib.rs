@@ -184,7 +184,9 @@ fn random<const LENGTH: usize>() -> Result<[u8; LENGTH], ServeError> {
 /// If it is in none, or in several.
 pub fn find_lan() -> Result<Ipv4Addr, ServeError> {
     let addresses = if_addrs::get_if_addrs().map_err(|error| ServeError::System("list of its addresses", error))?;
-    only_lan(addresses.into_iter().filter_map(|interface| match interface.ip() {
+    // The list of Windows also has adapters that are down.
+    let up = addresses.into_iter().filter(|interface| !cfg!(windows) || interface.is_oper_up());
+    only_lan(up.filter_map(|interface| match interface.ip() {
         std::net::IpAddr::V4(address) => Some(address),
         std::net::IpAddr::V6(_) => None,
     }))
@@ -195,6 +197,10 @@ fn only_lan(addresses: impl Iterator<Item = Ipv4Addr>) -> Result<Ipv4Addr, Serve
     // explicitly.
     let mut networks: Vec<Ipv4Addr> =
         addresses.filter(|address| address.is_private() || address.is_link_local()).collect();
+    // The system makes up a link-local address where it finds no network.
+    if networks.iter().any(Ipv4Addr::is_private) {
+        networks.retain(Ipv4Addr::is_private);
+    }
     networks.dedup();
     match networks.as_slice() {
         [] => Err(ServeError::NoNetwork),
@@ -302,6 +308,8 @@ mod tests {
             only_lan(addresses.iter().map(|&address| address.into())).map_err(|error| error.to_string())
         };
         assert_eq!(found(&[[127, 0, 0, 1], [192, 168, 4, 1], [8, 8, 8, 8]]), Ok([192, 168, 4, 1].into()));
+        assert_eq!(found(&[[169, 254, 9, 9], [192, 168, 4, 1]]), Ok([192, 168, 4, 1].into()));
+        assert_eq!(found(&[[127, 0, 0, 1], [169, 254, 9, 9]]), Ok([169, 254, 9, 9].into()));
         let error = found(&[[192, 168, 4, 1], [172, 17, 0, 1]]).unwrap_err();
         assert!(error.ends_with("as in `--lan 192.168.4.1`, of 192.168.4.1, 172.17.0.1"), "{error}");
         let error = found(&[[127, 0, 0, 1]]).unwrap_err();

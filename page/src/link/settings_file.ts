@@ -40,13 +40,14 @@ export function renameOldGap(values: Map<string, number>, value: (name: string) 
 /** The values that a file names, by the names of settings. Throws a SettingsFileError. */
 export function parse(text: string, settings: readonly Setting[]): Map<string, number> {
     const values = new Map<string, number>();
+    const isOld = settings.some(({ name }) => name === OLD_MERGE_GAP);
     for (const [index, line] of text.split(/\r?\n/).entries()) {
         if (/^\s*(#.*)?$/.test(line)) continue;
         const refuse = (problem: string) =>
             new SettingsFileError(english("fileLine", { line: index + 1, why: problem }));
         const [, name = "", word = ""] = /^\s*(\w+)\s*=\s*([^\s#]+)\s*(?:#.*)?$/.exec(line) ?? [];
         if (name === "") throw refuse(english("fileForm"));
-        if (name === OLD_MERGE_GAP) {
+        if (name === OLD_MERGE_GAP && !isOld) {
             if (!/^\d{1,4}$/.test(word) || Number(word) > 2000) throw refuse(english("fileOldGap", { name }));
             values.set(name, Number(word));
             continue;
@@ -68,7 +69,7 @@ export function parse(text: string, settings: readonly Setting[]): Map<string, n
     }
     // Settings that the file does not name are the machine's.
     const value = (name: string) => values.get(name) ?? settings.find((setting) => setting.name === name)?.value ?? 0;
-    renameOldGap(values, value);
+    if (!isOld) renameOldGap(values, value);
     if (values.size === 0) throw new SettingsFileError(english("fileEmpty"));
     return values;
 }

@@ -17,10 +17,11 @@ use frame::{Finding, print_to, tell};
 use link::advice;
 use link::examples::Heading;
 use link::rows::{Heard, Hold, Rows, What};
-use link::session::Happening;
+use link::session::{HOLD, Happening};
 use link::settings::other_version;
 use std::collections::VecDeque;
 use std::io::{self, Write};
+use std::mem;
 use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::{Duration, Instant};
 
@@ -69,6 +70,8 @@ struct Talk<'a> {
     hold: Option<Hold>,
     /// The numbers of lines that could not be sent.
     unsent: Vec<String>,
+    /// Whether the last line named a row only. A shell may split `left: start`, and `start` is not for all.
+    is_split: bool,
     /// Whether all could be printed.
     is_printed: bool,
     finding: Finding,
@@ -86,6 +89,7 @@ impl<'a> Talk<'a> {
             moved_at: Instant::now(),
             hold: None,
             unsent: Vec::new(),
+            is_split: false,
             is_printed: true,
             finding: Finding::Good,
         }
@@ -171,16 +175,19 @@ impl<'a> Talk<'a> {
     fn command(&mut self, line: &Line, output: &mut impl Write) {
         let names = self.chosen.names();
         let (to, command) = match addressed(&line.text, &names, None) {
+            // The machine does not answer a line without a word.
+            Ok((_, "")) => return,
+            Ok((_, command)) if mem::take(&mut self.is_split) && command == line.text.trim() && command != HOLD => {
+                self.refuse(line, "the line before has a row, and no command");
+                return;
+            }
             Ok(sent) => sent,
             Err(why) => {
+                self.is_split = line.text.trim_end().ends_with(':');
                 self.refuse(line, &why);
                 return;
             }
         };
-        // The machine does not answer a line without a word.
-        if command.is_empty() {
-            return;
-        }
         let to = to.map_or(0..self.rows.count(), |row| row..row + 1);
         if self.chosen.are_several && to.len() == self.rows.count() && link::is_hold(command) {
             self.hold = Some(Hold::new(Instant::now(), self.standing.iter().map(|row| row.is_there)));
@@ -380,6 +387,14 @@ mod tests {
             assert_eq!(ended.ok(), finding, "{kind}");
             assert_eq!(board.typed()[..3], ["events on", "get k", "hold"]);
         }
+    }
+
+    #[test]
+    fn a_command_that_a_shell_splits_from_its_row_is_not_sent() {
+        let board = ScriptedBoard::plugged_in();
+        let ended = talk(&board, &["Uno:", "", "start", "Uno:", "Uno: clear", "Uno:", "hold"], &mut Vec::new());
+        assert_eq!(ended.unwrap_err().to_string(), "not sent: lines 1, 3, 4, 6");
+        assert_eq!(board.typed()[..3], ["events on", "clear", "hold"]);
     }
 
     #[test]

@@ -4,11 +4,15 @@ use super::model::{Model, RowModel};
 use super::{addressed, view};
 use crate::ctrl_c;
 use crate::record::Logs;
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use link::rows::{Hold, Rows, What};
 use ratatui::DefaultTerminal;
-use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
-use std::io::{self, Write};
+use ratatui::crossterm::event::{
+    self, DisableMouseCapture, EnableMouseCapture, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers,
+};
+use ratatui::crossterm::execute;
+use ratatui::crossterm::tty::IsTty;
+use std::io::{self, IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -24,8 +28,21 @@ const LAST_HOLD: Duration = Duration::from_secs(2);
 /// Watches until Ctrl-C or Ctrl-D, or a signal to end. Fails if the terminal or a log fails.
 pub fn run(rows: &Rows, names: Vec<String>, mut logs: Option<Logs>) -> Result<()> {
     let stop = ctrl_c()?;
+    // The terminal of Git Bash is a pipe, which only the standard library knows. Keys would be read from another console.
+    let has_keys = !cfg!(windows) || !io::stdin().is_terminal() || io::stdin().is_tty();
+    ensure!(
+        has_keys,
+        "this terminal passes no keys, not even Esc: use PowerShell, `winpty weeder monitor`, or --plain"
+    );
     let mut terminal = ratatui::try_init().context("the terminal cannot be drawn on: --plain does without")?;
+    // On Windows, a click would begin a selection: the output stops, and the first Esc only ends the selection.
+    if cfg!(windows) {
+        let _ = execute!(io::stdout(), EnableMouseCapture);
+    }
     let result = watch(&mut terminal, rows, Model::new(names), &mut logs, &stop);
+    if cfg!(windows) {
+        let _ = execute!(io::stdout(), DisableMouseCapture);
+    }
     // The terminal may be gone.
     let _ = ratatui::try_restore();
     result.and_then(|()| logs.map_or(Ok(()), |logs| logs.check()))
@@ -222,6 +239,8 @@ mod tests {
         assert_eq!(enter("all: hold"), said("row1 row2 row3", "> all: hold", true));
         let unknown = "-- there is no row row4: there are row1, row2, row3; nothing was sent";
         assert_eq!(enter("row4: start"), said("", unknown, false));
+        let split = "-- \"row3:\" has no command: write both in one line, as in \"row3: status\"; nothing was sent";
+        assert_eq!(enter("row3:"), said("", split, false));
         // No row is connected, so each command is reported as not typed. The line for the unknown row4 was not sent.
         let mut not_typed = Vec::new();
         while not_typed.len() < 4 {

@@ -117,6 +117,11 @@ fn a_folder_called_report_where_the_command_is_typed_keeps_it_from_nothing() {
     let output = weeder(folder.path(), &[WRITERS[0].0, &["old"]].concat());
     let message = String::from_utf8_lossy(&output.stderr);
     assert!(message.contains("old/trial.csv is a folder, and a file would take its place"), "{message}");
+    fs::create_dir(folder.path().join("linked")).unwrap();
+    std::os::unix::fs::symlink("/proc/version", folder.path().join("linked/trial.csv")).unwrap();
+    let output = weeder(folder.path(), &[WRITERS[0].0, &["linked"]].concat());
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.stdout.is_empty() && message.contains("linked/trial.csv cannot be written: "), "{message}");
 }
 
 #[test]

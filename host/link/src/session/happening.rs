@@ -1,12 +1,17 @@
 //! What happens in a session.
 
 use crate::settings::{Settings, helps};
-use crate::{EventLine, Mode, Status};
+use crate::{EventLine, Mode, Status, Values};
 use control::alarm::Warning;
 use serde_json::{Value, json};
 
 /// Warnings that the answer to `status` does not name. They last until the machine holds.
 pub(super) const UNTIL_HOLD: [Warning; 2] = [Warning::LateCommand, Warning::SlipUnknown];
+
+/// The warning that a line of the answer to `status` names.
+pub(super) fn named_warning(line: &str) -> Option<Warning> {
+    Values(line).text("warning").and_then(|name| Warning::find(name.as_bytes()))
+}
 
 /// Something that happened in a session.
 #[derive(Clone, Debug, PartialEq, Eq)]

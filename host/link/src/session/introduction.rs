@@ -1,9 +1,10 @@
 //! The first questions of a session: version, settings, examples and status. If an answer is missing or wrong, they are
 //! asked from the beginning.
 
+use super::happening::named_warning;
 use super::{Asked, EVENTS, EXAMPLES, HOLD, Happening, POLL, SETTINGS, STATUS, Session, State, VERSION};
 use crate::settings::{self, Shown};
-use crate::{COMMAND_LENGTH, ConsoleLine, Counts, LinkError, Status, lines};
+use crate::{COMMAND_LENGTH, ConsoleLine, LinkError, Status, lines};
 
 /// Further tries to ask for everything, if an answer is missing or belongs to another question.
 const RETRIES: usize = 2;
@@ -105,7 +106,7 @@ impl Session {
         (self.poll_at, self.is_loss_told) = (self.waited + POLL, true);
         self.turn.happened.push(Happening::Connected { version, settings, shown, examples });
         self.warning = None;
-        let named = status.iter().find_map(|line| Counts::parse(line)?.warning);
+        let named = status.iter().find_map(|line| named_warning(line));
         // Before the first event, so that a log begins with the machine's state.
         let status = status.into_iter().find_map(|line| Some(Happening::Status(Status::parse(&line)?, line)));
         status.into_iter().chain(early).for_each(|happening| self.report(happening));
@@ -155,7 +156,7 @@ mod tests {
                     SETTINGS => "k=3 from 1 to 15, default 3, not saved\r\nok\r\n".to_owned(),
                     STATUS => format!(
                         "state=hold tool=out pos=0 speed_mm_s=0 windows=0 unseen_mm=400\r\n\
-                         lost=0 jumps=0 late=0 missed=0 mistakes=0 dust=0 stack_free=9 reset=button{named}\r\nok\r\n"
+                         lost=0 jumps=0{named}\r\nok\r\n"
                     ),
                     _ => "ok\r\n".to_owned(),
                 };
