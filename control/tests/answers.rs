@@ -91,12 +91,12 @@ fn a_setting_takes_every_value_of_its_range_and_no_other() {
             assert_eq!(machine.ask(&format!("get {name}"))[0], format!("{name}=on on or off, default off, not saved"));
             continue;
         }
-        let outside = [description.least.checked_sub(1), description.greatest.checked_add(1)];
+        let outside = [setting.least().checked_sub(1), setting.greatest().checked_add(1)];
         for value in outside.into_iter().flatten() {
-            let range = format!("from {} to {}", description.least, description.greatest);
+            let range = format!("from {} to {}", setting.least(), setting.greatest());
             let expected = format!("error: {name} takes a whole number {range}");
             assert_eq!(machine.ask(&format!("set {name} {value}")), [expected]);
-            assert_eq!(machine.settings().get(setting), description.greatest, "the old value stays");
+            assert_eq!(machine.settings().get(setting), setting.greatest(), "the old value stays");
         }
     }
 }
