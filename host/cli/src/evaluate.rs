@@ -3,6 +3,8 @@
 use anyhow::{Context, Result};
 use clap::Args;
 use frame::{OutFolder, OutName, Replace, command_line, number_within, print, say, source, tell, whole_within};
+use link::settings::shown;
+use logbook::log::{Entry, Kind};
 use logbook::worked::worked;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -51,7 +53,17 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let (analysis, joined) = match &arguments.log {
         Some(log) => {
             let levels_km_h = records.iter().map(|record| record.speed_km_h).collect();
-            let stretches = worked(&logbook::log::read(log)?);
+            let log = logbook::log::read(log)?;
+            // The firmware of another version may allow what is out of range here.
+            let is_foreign = |entry: &&Entry| {
+                entry.kind == Kind::Setting && shown(&entry.text).is_some_and(|(setting, value)| !setting.allows(value))
+            };
+            if let Some(Entry { number, text, .. }) = log.iter().find(is_foreign) {
+                tell!(
+                    "Warning: line {number} of the log has `{text}`, which this version does not allow: it counts as unknown"
+                );
+            }
+            let stretches = worked(&log);
             let joined = field_log::join(&mut records, &stretches, &arguments.plots)?;
             let warnings = joined.iter().flat_map(|of_log| [of_log.warning(), of_log.too_few_plants()]);
             warnings.flatten().for_each(|warning| tell!("{warning}"));

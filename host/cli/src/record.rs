@@ -163,11 +163,11 @@ impl Logs {
     /// Says what is in them, and fails if one could not be written.
     fn end(&self) -> Result<()> {
         for Log { path, writer, .. } in &self.0 {
-            let path_shown = path.display();
-            tell!("{} lines were added: {path_shown} has {} now", writer.added, writer.lines());
-            ensure!(path.exists(), "{path_shown} is gone: it was moved or deleted during the record");
+            let now = format!("{} has {} now", path.display(), writer.lines());
+            tell!("{} lines were added: {}", writer.added, if path.exists() { now } else { gone(path) });
         }
-        self.check()
+        self.check()?;
+        self.0.iter().find(|log| !log.path.exists()).map_or(Ok(()), |log| bail!(gone(&log.path)))
     }
 
     /// Fails if one could not be written.
@@ -177,4 +177,8 @@ impl Logs {
             None => Ok(()),
         }
     }
+}
+
+fn gone(path: &Path) -> String {
+    format!("{} is gone, because it was moved or deleted meanwhile", path.display())
 }

@@ -204,7 +204,8 @@ impl Guide {
         self.clear_alarm()?;
         let on_board = settings::read(&mut self.link)?;
         self.state.measured.settings.clone_from(&on_board);
-        let differs = |&setting: &Setting| on_board.get(setting) != kept.get(setting);
+        // The end switch may be the answer to an alarm just now.
+        let differs = |&setting: &Setting| setting != Setting::EndSwitch && on_board.get(setting) != kept.get(setting);
         let differing: Vec<Setting> = Setting::all().filter(differs).collect();
         if differing.is_empty() || !self.path.exists() || self.state.done.is_empty() {
             return Ok(());

@@ -116,7 +116,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     tell_k(training.k);
     if let Some(plants) = training.forgotten() {
         tell!(
-            "The table leaves {plants} plants more unknown than all detections together: allow more examples (--max, at most {MOST_EXAMPLES}), or take out weeds with a wrong label"
+            "With the table, {plants} more plants are unknown than with all detections: allow more examples (--max, at most {MOST_EXAMPLES}), or take out weeds with a wrong label"
         );
     }
     let is_rust = table.as_ref().is_some_and(|table| is_rust(table.path()));
@@ -149,7 +149,7 @@ impl Arguments {
         // As many weeds can be unknown to a table that knows its crop.
         if 10 * misread > count {
             tell!(
-                "The machine answered {misread} of {count} otherwise, so spacings behind them are not those at work: teach some first, and roll again"
+                "The machine classified {misread} of {count} otherwise, so the spacings after them differ from those at work: teach some first, and roll again"
             );
         }
         if count > QUICK {

@@ -105,8 +105,7 @@ impl Conditions {
     /// Whether the sweeps run between the zones round the stems of this row and of the next.
     fn check_sweeps(&self) -> Result<(), WrongValue> {
         let Range { start: from_mm, end: to_mm } = self.machine.swept_mm();
-        let zone_mm = self.crop.protected_mm / 2.0 + self.crop.across_scatter_mm;
-        let next_mm = self.plot.row_spacing_mm - zone_mm;
+        let Range { start: zone_mm, end: next_mm } = self.between_zones_mm();
         let why = if self.machine.sweeps_a_side == 0 {
             return Ok(());
         } else if from_mm < zone_mm {
@@ -117,6 +116,12 @@ impl Conditions {
             return Ok(());
         };
         Err(WrongValue::new("machine.sweep_from_mm", format!("is {from_mm}, but {why}")))
+    }
+
+    /// The ground across the row between the zones round the stems of this row and of the next.
+    fn between_zones_mm(&self) -> Range<f64> {
+        let zone_mm = self.crop.protected_mm / 2.0 + self.crop.across_scatter_mm;
+        zone_mm..self.plot.row_spacing_mm - zone_mm
     }
 
     /// Whether the second beam stands where the firmware takes one.
@@ -142,14 +147,20 @@ impl Conditions {
 
     /// Whether the machine strays farther than its sweeps allow, in sentences.
     fn cutting_sweeps(&self) -> Option<String> {
-        let room_mm = self.machine.sweep_from_mm - self.crop.protected_mm / 2.0 - self.crop.across_scatter_mm;
+        let (between, swept) = (self.between_zones_mm(), self.machine.swept_mm());
+        let (inner_mm, outer_mm) = (swept.start - between.start, between.end - swept.end);
+        let room_mm = inner_mm.min(outer_mm);
         let strays_mm = self.driving.steering_mm;
         let strays_too_far = self.machine.sweeps_a_side > 0 && strays_mm > room_mm;
         strays_too_far.then(|| {
+            let advice = if strays_mm > inner_mm {
+                format!("Set machine.sweep_from_mm to {:.0} or more.", (between.start + strays_mm).ceil())
+            } else {
+                let end_mm = (between.end - strays_mm).floor();
+                format!("Set machine.sweep_width_mm so that the sweeps end at {end_mm:.0} mm or less.")
+            };
             format!(
-                "driving.steering_mm is {strays_mm}, but the sweeps leave {room_mm:.1} mm: they cut plants. \
-                 Set machine.sweep_from_mm to {:.0} or more.",
-                (self.machine.sweep_from_mm + strays_mm - room_mm).ceil()
+                "driving.steering_mm is {strays_mm}, but the sweeps leave {room_mm:.1} mm: they cut plants. {advice}"
             )
         })
     }
@@ -364,6 +375,20 @@ mod tests {
         ] {
             let said = conditions.set(name, value).unwrap_err().to_string();
             assert!(said.starts_with(error), "{said}");
+        }
+    }
+
+    #[test]
+    fn a_machine_that_strays_into_the_zones_on_either_side_of_its_sweeps_gets_a_warning() {
+        let of = |changes: &[(&str, f64)]| Conditions::with("walked", changes).warning().unwrap_or_default();
+        assert_eq!(of(&[]), "");
+        let said = of(&[("driving.steering_mm", 16.0)]);
+        assert!(said.ends_with("leave 15.0 mm: they cut plants. Set machine.sweep_from_mm to 66 or more."), "{said}");
+        for change in [("plot.row_spacing_mm", 275.0), ("machine.sweep_width_mm", 142.5)] {
+            let said = of(&[change]);
+            assert!(said.starts_with("driving.steering_mm is 15, but the sweeps leave 0.0 mm: they cut"), "{said}");
+            assert!(said.contains("Set machine.sweep_width_mm so that the sweeps end at "), "{said}");
+            assert_eq!(of(&[change, ("machine.sweeps_a_side", 0.0)]), "");
         }
     }
 

@@ -4,9 +4,9 @@
 //! behind its pivot also carries the tool forward. The tool is `tool_width` wide across the row, and is treated as a line
 //! across it. A plant is *damaged* if the tool passes through the protected zone round its stem. A weed is *removed* if the tool or a sweep passes it. The
 //! sweeps run between the rows, do not swing, and stay clear of the zones while the machine keeps its line. If the
-//! machine strays, they cut plants as well. So does a tool that swings as far as the next row. Each kind of damage is
-//! counted by itself. A strip that no tool weeds may remain between the tool in the row and the nearest sweep
-//! ([`unweeded_strip_mm`]).
+//! machine strays, they cut plants of this row or of the next rows. So does a tool that swings as far as the next row.
+//! Each kind of damage is counted by itself. A strip that no tool weeds may remain between the tool in the row and the
+//! nearest sweep ([`unweeded_strip_mm`]).
 //!
 //! Weeding efficiency is counted twice (Eq. 22). *In the row* are the weeds between the sweeps on either side: they
 //! depend on the controller. *In the whole plot* are all weeds between the middles of two gaps between rows, as in the
@@ -60,7 +60,7 @@ pub struct Effect {
     pub all_unseen: u32,
     /// Crop plants through whose protected zone a sweep passed, but not the tool.
     pub swept: u32,
-    /// Crop plants of the next row whose protected zone the tool entered while it was out.
+    /// Crop plants of the next rows whose protected zone the tool, while it was out, or a sweep entered.
     pub neighbours: u32,
     /// Weeds in the row.
     pub in_row: WeedCount,
@@ -126,8 +126,12 @@ pub fn effect(
         effect.swept += u32::from(is_swept);
         effect.unseen += u32::from(!stem.is_seen && (is_damaged || is_swept));
     }
-    let is_cut = |stem: &&Stem| swinging.reaches(stem) && swinging.damages(stem);
-    effect.neighbours = stand.neighbours.iter().filter(is_cut).count() as u32;
+    for left in &stand.neighbours {
+        // The row on the right is its mirror image. Only sweeps reach that row.
+        let right = Stem { across_mm: -left.across_mm, ..*left };
+        let is_cut = sweep_cuts(left, mechanism, steering) || swinging.reaches(left) && swinging.damages(left);
+        effect.neighbours += u32::from(is_cut) + u32::from(sweep_cuts(&right, mechanism, steering));
+    }
     for weed in &stand.weeds {
         let across_mm = weed.across_mm - steering.across_mm(weed.along_mm);
         let is_removed = mechanism.swept_mm().contains(&across_mm.abs()) || swinging.removes(weed);
@@ -146,6 +150,10 @@ pub fn effect(
 /// Whether a sweep passes through the zone round a stem.
 fn sweep_cuts(stem: &Stem, mechanism: &Mechanism, steering: &Steering) -> bool {
     let swept = mechanism.swept_mm();
+    let (across_mm, near_mm) = (stem.across_mm.abs(), stem.protected_mm + steering.tool_within_mm());
+    if swept.is_empty() || across_mm + near_mm < swept.start || across_mm - near_mm > swept.end {
+        return false;
+    }
     let steps = stem.protected_mm.ceil() as i32;
     (-steps..=steps).any(|step| {
         let beside_mm = stem.protected_mm * f64::from(step) / f64::from(steps);
@@ -331,6 +339,26 @@ pub(crate) mod tests {
             let effect = steered(&stand, &Steering::default(), 800.0, 1100.0);
             assert_eq!((effect.neighbours, effect.injured()), (cut, cut), "{next_mm} mm");
         }
+    }
+
+    #[test]
+    fn a_machine_that_strays_cuts_plants_of_the_rows_on_either_side_with_its_sweeps() {
+        // The zone begins where the sweeps end. The tool is in its own row there.
+        let mut stand = stand();
+        stand.neighbours[0] = Stem { along_mm: 500.0, across_mm: 250.0, ..stand.neighbours[0] };
+        let cut = |within_mm: f64, seed: u64| {
+            let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+            let steering = Steering::within(within_mm, 0.0, -1000.0..3000.0, &mut rng);
+            steered(&stand, &steering, 800.0, 1100.0).neighbours
+        };
+        assert_eq!(cut(0.0, 0), 0);
+        assert!((0..20).all(|seed| cut(5.0, seed) > 0), "to the left or to the right");
+    }
+
+    #[test]
+    fn a_machine_without_sweeps_cuts_no_plant_with_them() {
+        let mechanism = Mechanism { sweeps_a_side: 0, sweep_from_mm: 10.0, ..Mechanism::default() };
+        assert!(!sweep_cuts(&stand().stems[0], &mechanism, &Steering::default()));
     }
 
     #[test]

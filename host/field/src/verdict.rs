@@ -206,9 +206,13 @@ pub fn judge(
         row.plants().map(|plant| plant_outcome(plant, &closed, &over_zone, machine, timing)).collect();
     let steering = Steering::default();
     let swinging = Swinging { machine, motion, steering: &steering, stroke: &stroke };
-    for stem in row.stems().iter().filter(|stem| swinging.damages(stem)) {
-        let after = plants.partition_point(|plant| plant.plant.span_mm().end < stem.along_mm);
-        if let Some(plant) = plants.get_mut(after) {
+    // A stem may stand beyond its canopy's end. A plant that the beam cannot see is not in the row.
+    for stem in row.stems().iter().filter(|stem| stem.is_seen && swinging.damages(stem)) {
+        let away_mm = |of: &PlantOutcome| {
+            let span = of.plant.span_mm();
+            (span.start - stem.along_mm).max(stem.along_mm - span.end)
+        };
+        if let Some(plant) = plants.iter_mut().min_by(|a, b| away_mm(a).total_cmp(&away_mm(b))) {
             plant.verdict = Verdict::Damaged;
         }
     }
@@ -342,6 +346,7 @@ mod tests {
     use super::*;
     use crate::machine::cycle_at;
     use crate::motion::mm_s;
+    use crate::row::Stem;
     use uno::CYCLES_PER_SECOND;
 
     const START_CYCLE: u64 = 16_000_000;
@@ -429,6 +434,18 @@ mod tests {
         assert!(judgement.plants.iter().all(|plant| plant.swings == 0));
         assert!(judgement.swing_errors_ticks().is_empty());
         assert_eq!(judgement.weeded_share, 1.0);
+    }
+
+    #[test]
+    fn a_damaged_stem_belongs_to_the_nearest_plant_if_the_beam_sees_it() {
+        let (motion, timing) = (motion(), Timing::default());
+        let pulses = pulses(&motion, &ideal_mm(timing));
+        for (is_seen, verdicts) in [(true, [Verdict::Damaged, Verdict::Kept]), (false, [Verdict::Kept; 2])] {
+            let mut row = row();
+            row.stems = Some(vec![Stem { is_seen, ..Stem::at(1250.0) }]);
+            let judgement = judge(&row, &Machine::default(), &motion, timing, &pulses, START_CYCLE);
+            assert!(judgement.plants.iter().map(|plant| plant.verdict).eq(verdicts), "{is_seen}");
+        }
     }
 
     #[test]

@@ -80,6 +80,9 @@ impl LinkError {
 }
 
 fn silent(command: &str, received: &str) -> String {
+    if received.is_empty() && command != "version" {
+        return format!("no answer to `{command}`: press the Uno's reset, and see to its cable and supply");
+    }
     if received.is_empty() {
         return "nothing answers at this port: choose another, or press the Uno's reset; flash a new board first"
             .to_owned();

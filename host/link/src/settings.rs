@@ -71,7 +71,7 @@ pub fn explain(contradiction: Contradiction) -> String {
                 .to_owned()
         }
         Contradiction::EncoderTooCoarse => {
-            "a wheel has to give 900 ticks a metre or more, or a failing encoder is found too late: ticks_per_m, and the value from ticks_per_rev and wheel_mm, must reach that; ticks_per_rev is four times the encoder's lines"
+            "a wheel has to give 900 ticks a metre or more, or a failing encoder is found too late: ticks_per_m, and the value from ticks_per_rev and wheel_mm, must reach that; ticks_per_rev is four times the encoder's lines: if it is, take more lines or a smaller wheel"
                 .to_owned()
         }
         Contradiction::BeamTooNear { needed_mm } => format!(

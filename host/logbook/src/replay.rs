@@ -123,8 +123,10 @@ pub fn replay_with(log: &[Entry], mut tell: impl FnMut(f64)) -> Result<Replayed,
     let mut stretches = 0;
     let mut rest = log;
     while let Some(start) = rest.iter().position(|entry| entry.kind == Kind::Connected) {
-        if let Some(said) = settings::other_version(&rest[start].text, &[]) {
-            replayed.notes.push(format!("line {}: {said}. It may decide otherwise", rest[start].number));
+        let version = &rest[start].text;
+        let note = format!("the log's firmware {version} is not this version, and may decide otherwise");
+        if settings::other_version(version, &[]).is_some() && !replayed.notes.contains(&note) {
+            replayed.notes.push(note);
         }
         rest = &rest[start + 1..];
         let end =

@@ -124,7 +124,7 @@ pub struct PlotOutcome {
 }
 
 /// The tool's distance from each plant's zone in the firmware: its canopy, or with `stem_zone_mm` the zone round its
-/// stem ([`field::verdict`]). This is stricter than damage, which is the tool in the protected zone.
+/// stem ([`field::verdict`]). Counted as if the machine kept its line, without play.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Zones {
     /// All zones. Joined plants have one.

@@ -144,7 +144,7 @@ const MEASURES: [Measure; 3] = [
         [
             "Plant damage",
             "% of the plants",
-            "Share of the plants whose stem zone a tool entered: the tool in the row, a sweep, or the tool of the next row. Plants that no beam sees are included. Lower is better.",
+            "Share of the plants whose stem zone a tool entered: the tool in the row, a sweep, or a tool or sweep of the next row. Plants that no beam sees are included. Lower is better.",
         ],
         "Plants damaged by each controller, %",
         |total| total.damage().percent(),

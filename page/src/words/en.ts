@@ -443,7 +443,7 @@ export const heard = {
     contradictSecondBeam:
         "a second beam stands 72 mm or more behind the first and ahead of the tool, and beam_to_tool_mm is 1000 at most: change second_beam_mm or beam_to_tool_mm",
     contradictEncoder:
-        "a wheel has to give 900 ticks a metre or more, or a failing encoder is found too late: ticks_per_m, and the value from ticks_per_rev and wheel_mm, must reach that; ticks_per_rev is four times the encoder's lines",
+        "a wheel has to give 900 ticks a metre or more, or a failing encoder is found too late: ticks_per_m, and the value from ticks_per_rev and wheel_mm, must reach that; ticks_per_rev is four times the encoder's lines: if it is, take more lines or a smaller wheel",
     contradictBeam:
         "margin_mm, lead_out_ms, beam_response_ms and top_speed_mm_s together need a beam_to_tool_mm of {needed} or more: raise it, or lower one of them",
 

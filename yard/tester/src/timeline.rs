@@ -131,11 +131,12 @@ impl Board for Tester {
     }
 
     fn check_capture(&mut self, width: u16) {
-        // A wire that nothing drives may have stayed high.
-        self.lines.drive_capture(false);
-        self.lines.drive_capture(true);
-        let begin = self.now();
-        while self.now().wrapping_sub(begin) < width.into() {}
+        // A wire that nothing drives may have stayed high. Its falling edge is taken first.
+        for (high, cycles) in [(false, 1600), (true, width)] {
+            self.lines.drive_capture(high);
+            let begin = self.now();
+            while self.now().wrapping_sub(begin) < cycles.into() {}
+        }
         self.lines.drive_capture(false);
     }
 }

@@ -21,7 +21,6 @@ use link::session::{HOLD, Happening};
 use link::settings::other_version;
 use std::collections::VecDeque;
 use std::io::{self, Write};
-use std::mem;
 use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::{Duration, Instant};
 
@@ -177,13 +176,16 @@ impl<'a> Talk<'a> {
         let (to, command) = match addressed(&line.text, &names, None) {
             // The machine does not answer a line without a word.
             Ok((_, "")) => return,
-            Ok((_, command)) if mem::take(&mut self.is_split) && command == line.text.trim() && command != HOLD => {
-                self.refuse(line, "the line before has a row, and no command");
+            Ok((_, command)) if self.is_split && command == line.text.trim() && command != HOLD => {
+                self.refuse(line, "a line before has a row, and no command: name the row");
                 return;
             }
-            Ok(sent) => sent,
+            Ok((to, command)) => {
+                self.is_split &= command == HOLD;
+                (to, command)
+            }
             Err(why) => {
-                self.is_split = line.text.trim_end().ends_with(':');
+                self.is_split |= line.text.trim_end().ends_with(':');
                 self.refuse(line, &why);
                 return;
             }
@@ -392,7 +394,7 @@ mod tests {
     #[test]
     fn a_command_that_a_shell_splits_from_its_row_is_not_sent() {
         let board = ScriptedBoard::plugged_in();
-        let ended = talk(&board, &["Uno:", "", "start", "Uno:", "Uno: clear", "Uno:", "hold"], &mut Vec::new());
+        let ended = talk(&board, &["Uno:", "", "test", "start", "Uno: clear", "Uno:", "hold"], &mut Vec::new());
         assert_eq!(ended.unwrap_err().to_string(), "not sent: lines 1, 3, 4, 6");
         assert_eq!(board.typed()[..3], ["events on", "clear", "hold"]);
     }

@@ -55,7 +55,12 @@ impl Guide {
             match event {
                 EventLine::NotCalibrated {} => {
                     tell!("  error: the end switch did not follow: see to it, or type off");
-                    self.set_end_switch(END_SWITCH)?;
+                    // A switch that never closes has an alarm in a third of a second, which asks the same.
+                    thread::sleep(Duration::from_millis(500));
+                    match settings::status(&mut self.link)?.alarm {
+                        Some(_) => self.clear_alarm()?,
+                        None => self.set_end_switch(END_SWITCH)?,
+                    }
                 }
                 EventLine::CalibratedBySwitch { out_ms, in_ms, is_set } => {
                     say!("  The tool was out after {out_ms} ms, and began to come back after {in_ms} ms.")?;

@@ -42,7 +42,7 @@ pub(super) fn summary(experiment: &Experiment, totals: &[Total]) -> Vec<String> 
     if damaged + swept + neighbours > 0 {
         sentences.push(format!(
             "Of the plants that the firmware's machine damaged, the tool hit {damaged}. Sweeps cut {swept}, where the machine strays. The \
-             beam cannot see {unseen} of these. The tool cut {neighbours} in the next row, where it swung aside."
+             beam cannot see {unseen} of these. Tool and sweeps cut {neighbours} in the next rows."
         ));
     }
     let strip_mm = unweeded_strip_mm(&experiment.conditions.machine(0), &experiment.conditions.machine);

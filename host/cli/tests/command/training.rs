@@ -156,7 +156,7 @@ fn a_table_that_forgets_plants_and_lines_that_were_answered_otherwise_are_told()
     fs::write(folder.path().join("objects.csv"), HEADER.replace("label", "answer,label") + &lines).unwrap();
     let output = weeder(folder.path(), &["train", "objects.csv", "--k", "3", "--max", "5"]);
     let told = String::from_utf8_lossy(&output.stderr);
-    for said in ["The table leaves 12 plants more unknown", "The machine answered 12 of 24 otherwise"] {
+    for said in ["With the table, 12 more plants are unknown", "The machine classified 12 of 24 otherwise"] {
         assert!(output.status.success() && told.contains(said), "{told}");
     }
 }

@@ -4,7 +4,7 @@
 use super::happening::named_warning;
 use super::{Asked, EVENTS, EXAMPLES, HOLD, Happening, POLL, SETTINGS, STATUS, Session, State, VERSION};
 use crate::settings::{self, Shown};
-use crate::{COMMAND_LENGTH, ConsoleLine, LinkError, Status, lines};
+use crate::{COMMAND_LENGTH, ConsoleLine, EventLine, LinkError, Status, lines};
 
 /// Further tries to ask for everything, if an answer is missing or belongs to another question.
 const RETRIES: usize = 2;
@@ -107,9 +107,15 @@ impl Session {
         self.turn.happened.push(Happening::Connected { version, settings, shown, examples });
         self.warning = None;
         let named = status.iter().find_map(|line| named_warning(line));
+        // The machine announces a warning once, perhaps before this connection.
+        let announced = named.and_then(|warning| {
+            let (event, line) = (EventLine::Warning { warning }, format!("warning name={}", warning.text()));
+            let is_told = early.iter().any(|told| matches!(told, Happening::Event(_, said) if *said == line));
+            (!is_told).then_some(Happening::Event(event, line))
+        });
         // Before the first event, so that a log begins with the machine's state.
         let status = status.into_iter().find_map(|line| Some(Happening::Status(Status::parse(&line)?, line)));
-        status.into_iter().chain(early).for_each(|happening| self.report(happening));
+        status.into_iter().chain(announced).chain(early).for_each(|happening| self.report(happening));
         self.take_named(named);
     }
 }
@@ -124,7 +130,8 @@ pub(crate) fn silence(question: &str, answer: &[String], partial: &str) -> LinkE
     let tail = received.char_indices().rev().nth(200).map_or(0, |(at, _)| at);
     let received = received[tail..].trim().to_owned();
     // Such as a satellite receiver at a converter that Unos have too.
-    if question == VERSION && !received.is_empty() {
+    let is_weeder_s = |line| matches!(ConsoleLine::parse(line), ConsoleLine::Version { .. } | ConsoleLine::Event(_));
+    if question == VERSION && !received.is_empty() && !received.lines().any(is_weeder_s) {
         return LinkError::NotTheWeeder(received);
     }
     LinkError::Silent { command: question.to_owned(), received }

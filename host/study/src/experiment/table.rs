@@ -8,7 +8,8 @@ use std::io;
 
 /// A line of [`write_csv`]: a plot's record, figures and loss budget, each cell behind its column's name.
 fn line(outcome: &PlotOutcome) -> Vec<(String, String)> {
-    let record = PlotRecord { time_s: outcome.record.time_s.map(thousandth), ..outcome.record };
+    let [area_m2, time_s] = [outcome.record.area_m2, outcome.record.time_s].map(|value| value.map(thousandth));
+    let record = PlotRecord { area_m2, time_s, ..outcome.record };
     let figure = |(name, figure): (&'static str, Value)| match figure.as_f64() {
         Some(number) if figure.is_f64() => (name, thousandth(number).to_string()),
         _ => (name, figure.to_string()),

@@ -261,6 +261,17 @@ fn field_efficiency_falls_with_speed_as_the_paper_s_equation_has_it() {
 }
 
 #[test]
+fn a_plot_s_area_has_three_decimals_in_a_table() {
+    // 3 rows of 2 m by 0.4 m are 2.4000000000000004 m2 in binary.
+    let outcomes = run(&experiment(&[1.0], "transplanted").of_firmware().with(&[("plot.row_m", 2.0)]));
+    let mut table = Vec::new();
+    write_csv(&outcomes, &[Treatment::Firmware], &mut table).unwrap();
+    let table = String::from_utf8(table).unwrap();
+    let areas: Vec<&str> = table.lines().filter_map(|line| line.split(',').nth(8)).collect();
+    assert_eq!(areas, ["area_m2", "2.4", "2.4"]);
+}
+
+#[test]
 fn weeds_are_those_on_the_counted_ground_even_if_it_has_none() {
     let sparse = Experiment { replications: 10, ..experiment(&[1.0], "transplanted") }.of_firmware();
     let outcomes = run(&sparse.with(&[("weeds.short_per_m2", 1.0), ("weeds.tall_per_m", 0.0), ("plot.rows", 2.0)]));

@@ -82,7 +82,7 @@ pub const CROPS: [Crop; 3] = [
         weed_widths_mm: 12.0..=30.0,
         ..CHILLI
     },
-    // Stalks below their leaves, and narrower grasses. So narrow a spacing leaves the tool no time much above 1 km/h.
+    // Stalks below their leaves, and narrower grasses. Above 1.25 km/h these examples no longer count.
     Crop {
         name: "maize",
         speeds_mm_s: &[SPEED_CLASSES_MM_S[0]],
