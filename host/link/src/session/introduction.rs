@@ -146,7 +146,7 @@ mod tests {
 
     #[test]
     fn a_warning_lasts_while_the_status_names_it_and_one_that_it_does_not_name_until_the_next_hold() {
-        let (mut session, mut now) = (Session::default(), Moment::default());
+        let (mut session, mut now, mut events) = (Session::default(), Moment::default(), Vec::new());
         session.open(false);
         let mut warnings = |said: &str, named: &str| {
             let (mut received, mut warnings) = (said.to_owned(), Vec::new());
@@ -155,6 +155,10 @@ mod tests {
                 let happened = session.turn(now, received.as_bytes()).happened;
                 warnings.extend(happened.into_iter().filter_map(|happening| match happening {
                     Happening::Warning(warning) => Some(warning),
+                    Happening::Event(_, line) => {
+                        events.push(line);
+                        None
+                    }
                     _ => None,
                 }));
                 received = match session.asked.front().map_or("", |asked| asked.line.as_str()) {
@@ -184,5 +188,8 @@ mod tests {
         for (said, named, changes) in cases {
             assert_eq!(warnings(said, named), changes, "{said:?}{named}");
         }
+        // A log and a script get the one that stood at the connection as an event.
+        let said = cases.iter().map(|(said, ..)| said.trim()).filter(|said| !said.is_empty());
+        assert_eq!(events, ["warning name=settings_older"].into_iter().chain(said).collect::<Vec<_>>());
     }
 }
