@@ -2,10 +2,10 @@
 // build/lockstep.mjs, the page's virtual Uno for another program.
 //
 // The page has three files that a browser opens from any source, also from the disk. Three more files make it
-// installable from a server. The firmware and the project's Rust are inside the page, because a page opened from the
-// disk may read no file. Both are compressed, as they would be more than half of the page. The firmware comes from
-// `cargo firmware`, which must run first. The command `weeder` proves its bounds: the one that WEEDER names, else this
-// repository's. The Rust is built here.
+// installable from a server. The firmware, the project's Rust and the translations are inside the page, because a page
+// opened from the disk may read no file. They are compressed, as they would be more than half of the page. The firmware
+// comes from `cargo firmware`, which must run first. The command `weeder` proves its bounds: the one that WEEDER names,
+// else this repository's. The Rust is built here.
 
 import { execFileSync } from "node:child_process";
 import { createHash } from "node:crypto";
@@ -45,6 +45,17 @@ const { WEEDER_COMMIT: commit = "", ...environment } = process.env;
 function rust() {
     execFileSync("cargo", ["page", "--quiet"], { stdio: "inherit", env: environment });
     return join(target, "wasm32-unknown-unknown/page/page.wasm");
+}
+
+/** The translations as a file: each table by its language. */
+function translations() {
+    const names = readdirSync("src/words").filter((name) => name.endsWith(".json"));
+    const tables = names.map((name) => [
+        basename(name, ".json"),
+        JSON.parse(readFileSync(`src/words/${name}`, "utf8")),
+    ]);
+    writeFileSync("build/languages.json", JSON.stringify(Object.fromEntries(tables)));
+    return "build/languages.json";
 }
 
 /** Compresses a file into a file; src/core.ts decompresses it. */
@@ -110,6 +121,7 @@ const common = {
     alias: {
         "firmware.deflated": packed(firmware()),
         "rust.deflated": packed(rust()),
+        "languages.deflated": packed(translations()),
         "log-worker.js": await logWorker(),
         "faults.json": faults(),
     },

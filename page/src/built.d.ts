@@ -1,5 +1,5 @@
-// The files that build.mjs includes: the firmware and the project's Rust, compressed, the worker that reads logs, and
-// the manual's alarms and warnings.
+// The files that build.mjs includes: the firmware, the project's Rust and the translations, compressed, the worker that
+// reads logs, and the manual's alarms and warnings.
 declare module "*.deflated" {
     const packed: Uint8Array<ArrayBuffer>;
     export default packed;

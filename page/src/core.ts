@@ -1,14 +1,17 @@
-// The compressed parts of the page: the project's own Rust, and the firmware. start.ts waits for them. The page is
-// smaller this way: the Base64 of compressed data is shorter than the data.
+// The compressed parts of the page: the project's own Rust, the firmware, and the translations. start.ts waits for them.
+// The page is smaller this way: the Base64 of compressed data is shorter than the data.
 
 import packedHex from "firmware.deflated";
+import packedLanguages from "languages.deflated";
 import packedRust from "rust.deflated";
 import { Rust } from "./rust.ts";
+import type { Translations } from "./words/words.ts";
 
 /** The Rust's module: for workers, and for further instances with their own state. */
 export let module: WebAssembly.Module;
 /** The firmware as a HEX file. */
 export let hex = "";
+export let translations: Translations;
 let rust: Rust;
 
 function unpack(packed: Uint8Array<ArrayBuffer>): Response {
@@ -17,6 +20,7 @@ function unpack(packed: Uint8Array<ArrayBuffer>): Response {
 
 /** Resolves when they are decompressed. */
 export const ready = (async () => {
+    translations = await unpack(packedLanguages).json();
     hex = await unpack(packedHex).text();
     module = new WebAssembly.Module(await unpack(packedRust).arrayBuffer());
     rust = new Rust(module);

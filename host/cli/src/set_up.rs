@@ -60,10 +60,12 @@ pub struct Arguments {
 
 /// The measures from which `weeder design` calculates the stroke: the key in a machine file, and the question.
 const TOOL_WIDTH: &str = "intra_row.width";
-const ASKED: [(&str, &str); 9] = [
+const ASKED: [(&str, &str); 11] = [
     (TOOL_WIDTH, "The tool's width"),
     ("intra_row.shank_length", "The arm's length, from the servo's axis to the blade's tip"),
+    ("intra_row.shank_diameter", "The arm's diameter, as that of a steel rod of its weight"),
     ("intra_row.blade_height", "The blade's height"),
+    ("intra_row.blade_mass", "The blade's mass, with its clamp"),
     ("intra_row.servo_torque", "The servo's greatest torque"),
     ("swing.servo_time_60", "The servo's time for 60 degrees without load"),
     ("swing.pulse_for_90", "The pulse's change in us for 90 degrees: 1000 for most, 667 for servos of 270 degrees"),

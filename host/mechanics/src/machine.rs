@@ -174,6 +174,8 @@ sections! {
         blade_base: Length = 45.0, MM, 1.0 to 500.0;
         /// Height of that triangle (h in Eq. 10).
         blade_height: Length = 10.0, MM, 1.0 to 300.0;
+        /// Mass of the blade with its clamp, at the end of the shank.
+        blade_mass: Mass = 0.2, KG, 0.01 to 20.0;
         /// Length of the shank, the arm on which the servo turns the blade (Table 1, no. 9).
         shank_length: Length = 350.0, MM, 20.0 to 2000.0;
         /// Diameter of the shank (Table 1, no. 9).

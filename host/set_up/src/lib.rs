@@ -354,7 +354,8 @@ impl SetUp {
             Err(missing) => match &missing[..] {
                 [again @ Step::MeasureAgain(..)] => Some(format!("margin_mm {in_use_mm} is too small: {again}")),
                 _ => (in_use_mm < safe_mm).then(|| {
-                    let missing: Vec<&str> = missing.iter().map(Step::name).collect();
+                    let mut missing: Vec<&str> = missing.iter().map(Step::name).collect();
+                    missing.dedup();
                     format!("margin_mm {in_use_mm} is not measured: {} first; {safe_mm} is safe", missing.join(" and "))
                 }),
             },

@@ -4,7 +4,7 @@ import type { Parts } from "../dom.ts";
 import type { EventLine } from "../link/console_line.ts";
 import { linesOf } from "../link/grammar.ts";
 import { type Ask, mayForce } from "../link/session.ts";
-import { type Plain, quantity, say } from "../words/words.ts";
+import { ended, type Plain, quantity, say } from "../words/words.ts";
 import type { Machine } from "./machine.ts";
 
 export class Calibration {
@@ -61,7 +61,7 @@ export class Calibration {
         const rolledMm = isOn ? (status.position - (this.#from ?? 0)) * tickMm : 0;
         this.parts.write(
             "wheel-rolled",
-            isOn ? say("rolled", { distance: quantity(rolledMm / 1000, "meter", 2) }) : say("notBegun"),
+            ended(isOn ? say("rolled", { distance: quantity(rolledMm / 1000, "meter", 2) }) : say("notBegun")),
         );
     }
 

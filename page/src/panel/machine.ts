@@ -5,7 +5,7 @@ import { plain } from "../dom.ts";
 import type { EventLine, Line, Mode, Setting } from "../link/console_line.ts";
 import { read, tickMm } from "../link/grammar.ts";
 import type { Happening } from "../link/session.ts";
-import { english, type Plain, quantity, say, table, told } from "../words/words.ts";
+import { ended, english, type Plain, quantity, say, table, told } from "../words/words.ts";
 
 /** Objects that are remembered. */
 const OBJECTS = 50;
@@ -223,5 +223,5 @@ export class Machine {
 
 export function sentence(text: string): string {
     const shown = plain(text);
-    return `${shown.charAt(0).toUpperCase()}${shown.slice(1)}${/[.!?।]$/.test(shown) ? "" : "."}`;
+    return ended(`${shown.charAt(0).toUpperCase()}${shown.slice(1)}`);
 }

@@ -3,7 +3,7 @@
 
 import { make, makeButton } from "../dom.ts";
 import { type HeldAll, Served } from "../link/served.ts";
-import { inLanguage, quantity, say, show, told } from "../words/words.ts";
+import { ended, inLanguage, quantity, say, show, told } from "../words/words.ts";
 import { fault } from "./machine.ts";
 import { Panel, TURN_MS } from "./panel.ts";
 
@@ -108,5 +108,5 @@ function inWords({ machines, lastMs }: HeldAll): string {
         lastMs === null
             ? say("obeyed", { obeyed, all })
             : say("obeyedAfter", { obeyed, all, time: quantity(lastMs, "millisecond") });
-    return `${not === "" ? "" : `${not}. `}${have}`;
+    return not === "" ? have : `${ended(not)} ${have}`;
 }

@@ -6,7 +6,7 @@ import { make, makeButton, type Parts, plain } from "../dom.ts";
 import { read } from "../link/grammar.ts";
 import type { Ask, Happening } from "../link/session.ts";
 import { Rust } from "../rust.ts";
-import { language, type Plain, quantity, say, show, table, told } from "../words/words.ts";
+import { ended, language, type Plain, quantity, say, show, table, told } from "../words/words.ts";
 import type { Machine } from "./machine.ts";
 
 /** The results of the session for the steps. */
@@ -89,7 +89,7 @@ export class SetUp {
         });
         const isAll = done === steps.length ? ` ${say("readWork")}` : "";
         this.parts.write("set-up-done", say("stepsDone", { done, all: steps.length }) + isAll);
-        const before = () => say("beforeMargin", { steps: missing.map((step) => `${told(step)}.`).join(" ") });
+        const before = () => say("beforeMargin", { steps: missing.map((step) => ended(told(step))).join(" ") });
         this.parts.write("margin-said", next === null ? before() : say("next", { step: told(next) }));
         this.parts.write("margin-warning", warning === null ? "" : say("warningOf", { what: told(warning) }));
         const button = this.parts.get("margin-set", HTMLButtonElement);
@@ -104,7 +104,7 @@ export class SetUp {
         this.parts.html("set-up-steps").replaceChildren(
             ...steps.map((manual, at) => {
                 const text = table.steps?.[manual.title] ?? `${manual.title}. ${manual.how}`;
-                const [title = ""] = text.split(".", 1);
+                const [title = ""] = text.split(/[.।]/, 1);
                 const mark = this.#marks[at] ?? "";
                 return make(
                     "li",

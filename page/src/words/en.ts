@@ -123,7 +123,7 @@ export const words = {
     outUntilCleared: "The tool is out until the alarm is cleared.",
     outUntilSwitch: "The tool is out: the machine holds until it is started, by the work switch.",
     outUntilStart: "The tool is out: the machine holds until it is started, by the work switch or here.",
-    movedByHand: "The tool is moved by hand. Keep clear of it.",
+    movedByHand: "The servo is driven directly. Keep clear of the tool.",
     weeds: "The tool is in the row, and weeds.",
     toolIsOut: "The tool is out. {reason}",
     reasonPlant: "A plant is at the tool, or comes up.",
@@ -447,7 +447,7 @@ export const heard = {
     contradictBeam:
         "margin_mm, lead_out_ms, beam_response_ms and top_speed_mm_s together need a beam_to_tool_mm of {needed} or more: raise it, or lower one of them",
 
-    // The next step of the set-up (host/set_up/src/lib.rs).
+    // The next step of the set-up, the parts of a margin, and warnings (host/set_up/src/).
     timeServo: "time the servo: `calibrate servo` ({done} of {all} done)",
     takeLead: "take the calculated lead: `set {name} {lead}`",
     measureWheel: "measure 10 m: `calibrate start`, roll, `calibrate 10000` ({done} of {all} done)",
@@ -455,7 +455,21 @@ export const heard = {
     lowerMargin: "lower the margin: `set margin_mm {margin}`: {sum}",
     raiseMargin: "raise the margin: `set margin_mm {margin}`: {sum}",
     marginReady: "the margin pays for {sum}: `save`",
-    marginTooSmall: "margin_mm {now} is too small: the measurements need {least}",
+    sumCanopy: "slip {slip} + servo {servo} + {firmware} mm at {speed} km/h",
+    sumStem: "slip {slip} + servo {servo} + stem {stem} + {firmware} mm",
+    marginTooSmall: "margin_mm {now} is too small: {why}",
+    measuredNeeds: "the measurements need {least}",
+    measureAgain: "the measurements need {least} mm: {how}",
+    howServo: "see to the servo, its times differ too much",
+    howPlants: "roll past more plants",
+    howWheel: "`set ticks_per_m 0`, and measure the wheel again",
     settingIsZero: "{name} is 0",
     marginNotMeasured: "margin_mm {now} is not measured: {missing} first; {safe} is safe",
+    nameServo: "time the servo",
+    nameLead: "set the lead",
+    nameWheel: "measure the wheel",
+    namePlants: "pass some plants",
+    servoAnd: "time the servo and {next}",
+    leadAnd: "set the lead and {next}",
+    wheelAnd: "measure the wheel and {next}",
 } as const;

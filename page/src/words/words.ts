@@ -1,14 +1,13 @@
 // The page in the operator's language: its texts, its numbers and its units.
 //
 // Each language has a table of texts: en.ts is the source, and the translations are JSON, which editors for translators
-// open. The page's HTML has the English texts, and `translate` finds them there. Texts that were set by `show` or
-// `translate` change with the language. Other texts must be written again by their own module.
+// open. The page has them compressed, so this module may be loaded only after core.ts is `ready`. The page's HTML has
+// the English texts, and `translate` finds them there. Texts that were set by `show` or `translate` change with the
+// language. Other texts must be written again by their own module.
 
+import { translations } from "../core.ts";
 import { chosen, keep } from "../preferences.ts";
 import * as en from "./en.ts";
-import es from "./es.json";
-import fr from "./fr.json";
-import hi from "./hi.json";
 
 export type Word = keyof typeof en.words;
 /** The keys of texts without placeholders. */
@@ -34,6 +33,14 @@ export interface Language {
 /** The names of the holes in a text. */
 type Holes<Text extends string> = Text extends `${string}{${infer Hole}}${infer Rest}` ? Hole | Holes<Rest> : never;
 
+/** The translations: each JSON file of this folder. */
+export interface Translations {
+    readonly hi: typeof import("./hi.json");
+    readonly es: typeof import("./es.json");
+    readonly fr: typeof import("./fr.json");
+}
+
+const { hi, es, fr } = translations;
 /** The languages. */
 export const LANGUAGES = { en, hi, es, fr } as const satisfies Readonly<Record<string, Language>>;
 export type Code = keyof typeof LANGUAGES;
@@ -142,6 +149,12 @@ const heard = Object.entries(en.heard)
         return { word: word as HeardWord, holes, pattern: new RegExp(`^${parts.join("(.*)")}$`, "s") };
     });
 
+/** A text with its full stop: that of its script, as some text stays English. */
+export function ended(text: string): string {
+    const stop = /\p{Script=Devanagari}/u.test(text) ? "।" : ".";
+    return /[.!?।]$/.test(text) ? text : text + stop;
+}
+
 /** The text of an error. */
 export const reason = (error: unknown): string => (error instanceof Error ? error.message : String(error));
 
@@ -149,6 +162,9 @@ export const reason = (error: unknown): string => (error instanceof Error ? erro
 export function told(english: unknown): string {
     const text = reason(english);
     if (code === "en") return text;
+    // A number within such a text.
+    const [, decimals] = /^\d+\.(\d+)$/.exec(text) ?? [];
+    if (decimals) return number(Number(text), decimals.length);
     // The same text as a sentence or within one.
     const bare = `${text.charAt(0).toLowerCase()}${text.slice(1).replace(/\.$/, "")}`;
     for (const { word, holes, pattern } of heard) {

@@ -358,13 +358,14 @@ fn without_a_machine_s_file_its_measures_are_asked_and_nothing_else_is_offered()
     let mut input = vec!["", "s", "", "300", "", "", "", "2000", "90", "s"];
     // Step 5 by a person's own measures, one of them out of range at first.
     input.extend([
-        "maybe", "", "", "300", "2.5", "40", "0.2", "800", "900", "80", "20", "15", "", "", "", "", "", "s", "s", "s",
+        "maybe", "", "", "300", "20", "2.5", "0.3", "40", "0.2", "800", "900", "80", "20", "15", "", "", "", "", "",
+        "s", "s", "s",
     ]);
     let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
     command.current_dir(&folder).args(["set-up", "--port", "./uno"]);
     let printed = printed(&typed(&mut command, input.join("\n") + "\n"), 0);
-    let machine = "[intra_row]\nwidth = \"90 mm\"\nshank_length = \"300 mm\"\nblade_height = \"2.5 mm\"\n\
-        servo_torque = \"40 kg cm\"\n[swing]\nservo_time_60 = \"0.2 s\"\npulse_for_90 = 800\nprotected = \"80 mm\"\n\
+    let machine = "[intra_row]\nwidth = \"90 mm\"\nshank_length = \"300 mm\"\nshank_diameter = \"20 mm\"\n\
+        blade_height = \"2.5 mm\"\nblade_mass = \"0.3 kg\"\nservo_torque = \"40 kg cm\"\n[swing]\nservo_time_60 = \"0.2 s\"\npulse_for_90 = 800\nprotected = \"80 mm\"\n\
         stem_off = \"20 mm\"\nroom = \"15 mm\"\n";
     fs::write(folder.path().join("my.toml"), machine).expect("there is room for a file");
     let design = said(folder.path(), &["design", "--machine", "my.toml"]);
