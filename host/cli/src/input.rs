@@ -1,13 +1,14 @@
 //! What is typed or piped into a command: bytes from a shell, a script or another program, as lines.
 //!
-//! CR, LF or both end a line. A byte order mark is dropped, and UTF-16 is read, because some shells write both. A byte
-//! that is no text spoils its own line only. Lines are bounded, so that input without line ends is refused too.
+//! CR, LF or both end a line. The text is UTF-8, because rows have names in any language. A byte order mark is dropped,
+//! and UTF-16 is read, because some shells write both. A byte that is no text spoils its own line only. Lines are
+//! bounded, so that input without line ends is refused too.
 
 use std::io::{self, ErrorKind, Read};
 use std::sync::mpsc::{self, Receiver};
 use std::thread;
 
-/// The greatest length of a line in characters: more than a row's name and a command.
+/// The greatest length of a line in bytes, or units of UTF-16: more than a row's name and a command.
 const LIMIT: usize = 200;
 
 /// A line of the input.
@@ -15,15 +16,14 @@ const LIMIT: usize = 200;
 pub struct Line {
     /// Its number, counted from 1.
     pub number: usize,
-    /// Its text. A character that the console does not take is U+FFFD. The end of a long line is missing.
+    /// Its text. What is no text, or a control character, is U+FFFD. The end of a long line is missing.
     pub text: String,
 }
 
 /// How the input writes its characters.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Encoding {
-    /// A byte each; bytes outside of ASCII are no characters of the console.
-    Bytes,
+    Utf8,
     /// UTF-16 with the low byte first, or last.
     LittleEndian,
     BigEndian,
@@ -34,25 +34,36 @@ impl Encoding {
     fn of(first: &[u8], is_all: bool) -> Option<(Self, usize)> {
         Some(match *first {
             // Enter alone is a whole line, so nothing waits for a second byte.
-            [b'\r' | b'\n', ..] => (Self::Bytes, 0),
-            [0xEF, 0xBB, 0xBF, ..] => (Self::Bytes, 3),
+            [b'\r' | b'\n', ..] => (Self::Utf8, 0),
+            [0xEF, 0xBB, 0xBF, ..] => (Self::Utf8, 3),
             [0xFF, 0xFE, ..] => (Self::LittleEndian, 2),
             [0xFE, 0xFF, ..] => (Self::BigEndian, 2),
             // UTF-16 without a mark: a command begins with an ASCII character.
             [1..=0x7F, 0, ..] => (Self::LittleEndian, 0),
             [0, 1..=0x7F, ..] => (Self::BigEndian, 0),
             [] | [_] | [0xEF, 0xBB] if !is_all => return None,
-            _ => (Self::Bytes, 0),
+            _ => (Self::Utf8, 0),
         })
     }
 
-    /// The first character, and the bytes behind it.
+    /// The first byte, or unit of UTF-16, and the bytes behind it.
     fn first(self, bytes: &[u8]) -> Option<(u16, &[u8])> {
         match (self, bytes) {
-            (Self::Bytes, [byte, rest @ ..]) => Some((u16::from(*byte), rest)),
+            (Self::Utf8, [byte, rest @ ..]) => Some((u16::from(*byte), rest)),
             (Self::LittleEndian, [low, high, rest @ ..]) => Some((u16::from_le_bytes([*low, *high]), rest)),
             (Self::BigEndian, [high, low, rest @ ..]) => Some((u16::from_be_bytes([*high, *low]), rest)),
             _ => None,
+        }
+    }
+
+    /// The text of these bytes or units.
+    fn text(self, codes: &[u16]) -> String {
+        match self {
+            Self::Utf8 => {
+                let bytes: Vec<u8> = codes.iter().map(|code| code.to_le_bytes()[0]).collect();
+                String::from_utf8_lossy(&bytes).into_owned()
+            }
+            Self::LittleEndian | Self::BigEndian => String::from_utf16_lossy(codes),
         }
     }
 }
@@ -61,12 +72,12 @@ impl Encoding {
 #[derive(Default)]
 struct Lines {
     encoding: Option<Encoding>,
-    /// Bytes that are no whole character yet.
+    /// Bytes that are no whole unit yet.
     begun: Vec<u8>,
-    text: String,
-    length: usize,
+    /// The line's bytes or units so far.
+    line: Vec<u16>,
     number: usize,
-    /// Whether the last character was a CR. It makes one line end with an LF behind it.
+    /// Whether the last one was a CR. It makes one line end with an LF behind it.
     after_return: bool,
     complete: Vec<Line>,
 }
@@ -85,41 +96,38 @@ impl Lines {
         let begun = std::mem::take(&mut self.begun);
         let mut rest = begun.as_slice();
         while let Some((code, behind)) = encoding.first(rest) {
-            self.character(code);
+            self.code(code, encoding);
             rest = behind;
         }
         if is_all {
-            // A last line without an end is a line too.
-            (!rest.is_empty()).then(|| self.push(char::REPLACEMENT_CHARACTER));
-            (self.length > 0).then(|| self.end());
+            // A last line without an end is a line too. Half a unit of UTF-16 is no text.
+            (!rest.is_empty()).then(|| self.line.push(0xFFFD));
+            (!self.line.is_empty()).then(|| self.end(encoding));
         } else {
             self.begun = rest.to_vec();
         }
         std::mem::take(&mut self.complete)
     }
 
-    fn character(&mut self, code: u16) {
+    fn code(&mut self, code: u16, encoding: Encoding) {
         let after_return = std::mem::replace(&mut self.after_return, code == u16::from(b'\r'));
         match u8::try_from(code) {
             Ok(b'\n') if after_return => {}
-            Ok(b'\r' | b'\n') => self.end(),
-            Ok(b'\t') => self.push(' '),
-            Ok(printable @ b' '..=b'~') => self.push(char::from(printable)),
-            _ => self.push(char::REPLACEMENT_CHARACTER),
+            Ok(b'\r' | b'\n') => self.end(encoding),
+            _ if self.line.len() < LIMIT => self.line.push(code),
+            _ => {}
         }
     }
 
-    fn push(&mut self, character: char) {
-        self.length += 1;
-        if self.length <= LIMIT {
-            self.text.push(character);
-        }
-    }
-
-    fn end(&mut self) {
+    fn end(&mut self, encoding: Encoding) {
         self.number += 1;
-        self.length = 0;
-        self.complete.push(Line { number: self.number, text: std::mem::take(&mut self.text) });
+        let shown = |character: char| match character {
+            '\t' => ' ',
+            control if control.is_control() => char::REPLACEMENT_CHARACTER,
+            character => character,
+        };
+        let text = encoding.text(&std::mem::take(&mut self.line)).chars().map(shown).collect();
+        self.complete.push(Line { number: self.number, text });
     }
 }
 
@@ -178,6 +186,13 @@ mod tests {
         assert_eq!(lines(&[0; 5000], 7).len(), 1);
     }
 
+    #[test]
+    fn a_row_s_name_in_any_language_is_read_and_what_is_no_text_is_marked() {
+        let name = "s\u{fc}d \u{921}\u{940}: hold";
+        assert_eq!(lines(format!("{name}\n").as_bytes(), 1), [(1, name.to_owned())]);
+        assert_eq!(lines(b"s\x81d:\thold\x1b", 1), [(1, "s\u{fffd}d: hold\u{fffd}".to_owned())]);
+    }
+
     /// A line's text. Some characters have a line end among their bytes in UTF-16.
     fn any_text() -> impl Strategy<Value = String> {
         prop_oneof![
@@ -225,7 +240,7 @@ mod tests {
                 match found.next() {
                     Some((at, line)) => {
                         prop_assert_eq!(at, number);
-                        if text.is_ascii() {
+                        if text.is_ascii() || encoding != "latin-1" {
                             prop_assert_eq!(&line, text);
                         } else {
                             prop_assert!(!link::is_command(&line), "{:?} became {:?}", text, line);

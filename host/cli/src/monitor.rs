@@ -75,9 +75,9 @@ fn addressed<'a>(line: &'a str, names: &[String], chosen: Option<usize>) -> Resu
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let chosen = arguments.ports.choose(None)?;
     let logs = arguments.log.as_deref().map(|out| Logs::open(out, &chosen)).transpose()?;
-    let (rows, are_there) = record::open(&chosen)?;
+    let (rows, connected) = record::open(&chosen)?;
     match arguments.plain {
-        true => plain::run(&rows, &are_there, &chosen, logs),
+        true => plain::run(&rows, connected, &chosen, logs),
         false => terminal::run(&rows, chosen.names(), logs).map(|()| Finding::Good),
     }
 }

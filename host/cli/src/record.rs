@@ -7,7 +7,7 @@ use anyhow::{Result, bail, ensure};
 use clap::Args;
 use frame::{OutName, Replace, tell};
 use link::advice;
-use link::rows::{Rows, What};
+use link::rows::{Heard, Rows, What};
 use link::session::Happening;
 use link::settings::other_version;
 use logbook::log::{Kind, LogError, LogWriter};
@@ -46,7 +46,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let gps = arguments.gps.open(&chosen)?;
     let mut logs = Logs::open(&arguments.out, &chosen)?;
     if let Some((receiver, lines)) = &gps {
-        logs.write(receiver.row, |log| log.lines_at(log.now_ms(), lines))?;
+        let time_ms = logs.time_ms(receiver.row, Instant::now());
+        logs.write(receiver.row, |log| log.lines_at(time_ms, lines))?;
     }
     let mut gps = gps.map(|(receiver, _)| receiver);
     let (rows, _) = open(&chosen)?;
@@ -54,7 +55,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     tell!("Recording into {}, Ctrl-C ends it", arguments.out.display());
     while !stop.load(Ordering::Relaxed) {
         if let Some(gps) = &mut gps {
-            let time_ms = logs.now_ms(gps.row);
+            let time_ms = logs.time_ms(gps.row, Instant::now());
             let said = gps.turn(time_ms, Instant::now());
             let written = logs.write(gps.row, |log| log.lines_at(time_ms, &said));
             logs.go_on_after(written, gps.row, &chosen)?;
@@ -64,30 +65,17 @@ pub fn run(arguments: &Arguments) -> Result<()> {
                 }
             }
         }
-        let Some(heard) = rows.next(LOOK) else { continue };
-        let What::Happened(happening) = heard.what else { continue };
-        let written = logs.write(heard.row, |log| log.write(log.now_ms(), &happening));
-        logs.go_on_after(written, heard.row, &chosen)?;
-        if let Some(gps) = gps.as_mut().filter(|gps| gps.row == heard.row) {
-            gps.happened(logs.now_ms(heard.row), &happening);
-        }
-        match happening {
-            Happening::Connected { version, shown, .. } => {
-                tell!("{}", chosen.under_name(heard.row, &format!("weeder {version} is there")));
-                if let Some(other) = other_version(&version, &shown) {
-                    tell!("{}", chosen.under_name(heard.row, &other));
-                }
+        // All that waits: a read of the receiver may take 16 ms on Windows, in which several events come.
+        let mut patience = LOOK;
+        while let Some(heard) = rows.next(patience) {
+            patience = Duration::ZERO;
+            let written = logs.take(&heard);
+            logs.go_on_after(written, heard.row, &chosen)?;
+            let What::Happened(happening) = heard.what else { continue };
+            if let Some(gps) = gps.as_mut().filter(|gps| gps.row == heard.row) {
+                gps.happened(logs.time_ms(heard.row, heard.at), &happening);
             }
-            Happening::Started { while_at_work: Some(cause), .. } => {
-                let mut errors = io::stderr();
-                if errors.is_terminal() {
-                    // As for `tell!`: a bell that fails ends no record.
-                    let _ = errors.write_all(b"\x07");
-                }
-                tell!("{}", chosen.under_name(heard.row, &advice::restarted(&cause)));
-            }
-            Happening::Lost(why) => tell!("{}", chosen.under_name(heard.row, &why)),
-            _ => {}
+            tell_of(&chosen, heard.row, happening);
         }
     }
     if let Some(gps) = &gps {
@@ -96,18 +84,42 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     logs.end()
 }
 
-/// Opens all rows, and returns which are connected. With several rows, missing ones are reported and tried again.
-/// Fails if no row is connected.
-pub fn open(chosen: &Chosen) -> Result<(Rows, Vec<bool>)> {
-    let (rows, missing) = Rows::open(chosen.openers());
-    let are_there: Vec<bool> = missing.iter().map(Option::is_none).collect();
-    if are_there.contains(&true) {
-        return Ok((rows, are_there));
-    }
-    for (row, why) in missing.into_iter().flatten().enumerate() {
-        if !chosen.are_several {
-            return Err(why.into());
+/// Tells the user what has happened to a row.
+fn tell_of(chosen: &Chosen, row: usize, happening: Happening) {
+    match happening {
+        Happening::Connected { version, shown, .. } => {
+            tell!("{}", chosen.under_name(row, &format!("weeder {version} is there")));
+            if let Some(other) = other_version(&version, &shown) {
+                tell!("{}", chosen.under_name(row, &other));
+            }
         }
+        Happening::Started { while_at_work: Some(cause), .. } => {
+            let mut errors = io::stderr();
+            if errors.is_terminal() {
+                // As for `tell!`: a bell that fails ends no record.
+                let _ = errors.write_all(b"\x07");
+            }
+            tell!("{}", chosen.under_name(row, &advice::restarted(&cause)));
+        }
+        Happening::Lost(why) => tell!("{}", chosen.under_name(row, &why)),
+        _ => {}
+    }
+}
+
+/// Opens all rows, and returns the first that is connected. The others may not be tried yet: their events say how it
+/// ends. Missing rows are tried again. Fails if no row is connected.
+pub fn open(chosen: &Chosen) -> Result<(Rows, usize)> {
+    let (rows, first_tries) = Rows::open(chosen.openers());
+    let mut missing = Vec::new();
+    for (row, why) in first_tries {
+        match why {
+            None => return Ok((rows, row)),
+            Some(why) if !chosen.are_several => return Err(why.into()),
+            Some(why) => missing.push((row, why)),
+        }
+    }
+    missing.sort_by_key(|(row, _)| *row);
+    for (row, why) in missing {
         tell!("{}", chosen.under_name(row, &format!("{:#}", anyhow::Error::from(why))));
     }
     bail!("none of the {} rows is there", rows.count());
@@ -120,6 +132,8 @@ struct Log {
     path: PathBuf,
     writer: LogWriter,
     is_written: bool,
+    /// The time of the last line.
+    last_ms: u64,
 }
 
 impl Logs {
@@ -131,24 +145,31 @@ impl Logs {
         }
         let path = |row| if chosen.are_several { Chosen::file_in(out, row, "csv") } else { out.to_owned() };
         let paths = chosen.rows.iter().map(path);
-        let log = |path: PathBuf| Ok(Log { writer: LogWriter::open(&path)?, path, is_written: true });
+        let log = |path: PathBuf| Ok(Log { writer: LogWriter::open(&path)?, path, is_written: true, last_ms: 0 });
         Ok(Self(paths.map(log).collect::<Result<_, LogError>>()?))
     }
 
     /// Writes into a row's log. Fails at the first failure of the log, which is not written again.
-    pub fn write(
-        &mut self,
-        row: usize,
-        work: impl FnOnce(&mut LogWriter) -> Result<(), LogError>,
-    ) -> Result<(), LogError> {
+    fn write(&mut self, row: usize, work: impl FnOnce(&mut LogWriter) -> Result<(), LogError>) -> Result<(), LogError> {
         let log = &mut self.0[row];
         let written = if log.is_written { work(&mut log.writer) } else { Ok(()) };
         written.inspect_err(|_| log.is_written = false)
     }
 
-    /// The time of a row's line written now, in milliseconds.
-    fn now_ms(&self, row: usize) -> u64 {
-        self.0[row].writer.now_ms()
+    /// Writes a row's event, with the time at which it came.
+    pub fn take(&mut self, heard: &Heard) -> Result<(), LogError> {
+        let What::Happened(happening) = &heard.what else { return Ok(()) };
+        let time_ms = self.time_ms(heard.row, heard.at);
+        self.write(heard.row, |log| log.write(time_ms, happening))
+    }
+
+    /// The time of a row's line that came at `at`, in milliseconds. It never goes back: readers would take that for a
+    /// log that was opened again.
+    fn time_ms(&mut self, row: usize, at: Instant) -> u64 {
+        let log = &mut self.0[row];
+        let age_ms = u64::try_from(at.elapsed().as_millis()).unwrap_or(u64::MAX);
+        log.last_ms = log.last_ms.max(log.writer.now_ms().saturating_sub(age_ms));
+        log.last_ms
     }
 
     /// Reports a log that could not be written. The other rows' logs continue. Fails if no log is left.
@@ -181,4 +202,26 @@ impl Logs {
 
 fn gone(path: &Path) -> String {
     format!("{} is gone, because it was moved or deleted meanwhile", path.display())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use link::row_names::{Board, Row};
+    use std::thread::sleep;
+
+    #[test]
+    fn a_line_has_the_time_at_which_it_came_and_none_before_the_last() {
+        let folder = tempfile::tempdir().unwrap();
+        let row = Row { name: "Uno".to_owned(), board: Board::Only { beside: None } };
+        let chosen = Chosen { rows: vec![row], are_several: false };
+        let mut logs = Logs::open(&folder.path().join("log.csv"), &chosen).unwrap();
+        let at = Instant::now();
+        sleep(Duration::from_millis(50));
+        let came_ms = logs.time_ms(0, at);
+        // Each of both times may be rounded by a millisecond.
+        assert!(came_ms + 48 <= logs.0[0].writer.now_ms(), "{came_ms}");
+        let later_ms = logs.time_ms(0, Instant::now());
+        assert_eq!(logs.time_ms(0, at), later_ms);
+    }
 }

@@ -104,12 +104,15 @@ fn pull(file: Option<&OutName>, replace: Replace, json: bool, chosen: &Chosen) -
         let shown = Shown::by(&lines);
         // Another version's status may be unknown.
         if settings::status(link).is_ok_and(|status| status.alarm == Some(Alarm::SettingsLost)) {
-            const LOST: &str = "the machine has lost its settings, or is new (alarm 5-1): it has the factory's";
+            const LOST: &str = "the machine lost its settings, or is new (alarm 5-1): it started with factory settings";
             if let Some(path) =
                 path(row).filter(|path| path.metadata().is_ok_and(|there| there.is_file() && there.len() > 0))
             {
                 let path = path.display();
-                bail!("{LOST}, and {path} is not replaced. `weeder settings push {path}` restores them");
+                bail!(
+                    "{LOST}, and {path} is not replaced. `weeder settings push {path}` restores them. Then `clear` in \
+                     `weeder monitor` ends the alarm"
+                );
             }
             tell!("{}: {LOST}", row.name);
         }

@@ -116,7 +116,12 @@ fn bootloader(name: &Path) -> Result<Bootloader> {
 pub fn run(arguments: &Arguments) -> Result<()> {
     let bootloader = arguments.bootloader.as_deref().map(bootloader).transpose()?;
     let count = arguments.rows;
-    let rows = (0..count as u64).map(|number| arguments.course.nth_row(number)).collect::<Result<Vec<_>>>()?;
+    let row = |number| arguments.course.nth_row(number);
+    let rows = match arguments.course.row {
+        // Standard input can be read once.
+        Some(_) => vec![row(0)?; count],
+        None => (0..count as u64).map(row).collect::<Result<_>>()?,
+    };
     let conditions = arguments.course.conditions_of(&arguments.course.field)?;
     let (machine, speed_mm_s) = (conditions.machine(arguments.course.seed), mm_s(arguments.course.speed));
     let courses = Course::of_rows(rows, machine, speed_mm_s, conditions.ground.slip_percent / 100.0);
@@ -209,7 +214,12 @@ fn next_command(ports: &[&Path], bootloader: Option<&Bootloader>) -> Result<Stri
         Some(bootloader) if is_old(bootloader) => (&["weeder", "flash", "--old-bootloader"], &ports[..1]),
         Some(_) => (&["weeder", "flash"], &ports[..1]),
     };
-    let ports: Vec<String> = ports.iter().map(|port| port.to_string_lossy().into_owned()).collect();
+    // Without a separator it could be a row's name.
+    let path = |port: &&Path| match port.parent() {
+        Some(folder) if folder.as_os_str().is_empty() => format!("./{}", port.display()),
+        _ => port.display().to_string(),
+    };
+    let ports: Vec<String> = ports.iter().map(path).collect();
     let ports = ports.iter().flat_map(|port| ["--port", port]);
     Ok(shlex::try_join(begin.iter().copied().chain(ports))?)
 }

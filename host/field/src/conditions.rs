@@ -259,7 +259,14 @@ fn explain(text: &str, byte: usize, error: &toml::de::Error) -> String {
             let words: Vec<String> = known.words.iter().map(|word| format!("\"{word}\"")).collect();
             return Some(format!("{name} is {written}, but has to be {}: {meaning}", words.join(" or ")));
         }
-        Some(format!("{name} is {written}, but has to be a number from {least} to {greatest}: {meaning}"))
+        // The reader expects u16 or u32 for a whole number.
+        let right = match error.message().contains(", expected u") {
+            // A switched setting.
+            true if greatest <= 1.0 => "0 for off, or 1 for on".to_owned(),
+            true => format!("a whole number from {least} to {greatest}, without a point"),
+            false => format!("a number from {least} to {greatest}"),
+        };
+        Some(format!("{name} is {written}, but has to be {right}: {meaning}"))
     });
     wrong.unwrap_or_else(|| error.message().trim().replace('\n', ", "))
 }
@@ -350,6 +357,18 @@ mod tests {
             (
                 "[ground]\nslip_percent = \"much\"\n",
                 "field.toml, line 2: ground.slip_percent is \"much\", but has to be a number from -30 to 30: mean slip",
+            ),
+            (
+                "[plot]\nrows = 3.0\n",
+                "field.toml, line 2: plot.rows is 3.0, but has to be a whole number from 1 to 1000, without a point: ",
+            ),
+            (
+                "[settings]\nk = 5.0\n",
+                "field.toml, line 2: settings.k is 5.0, but has to be a whole number from 1 to 15, without a point: ",
+            ),
+            (
+                "[settings]\nend_switch = true\n",
+                "field.toml, line 2: settings.end_switch is true, but has to be 0 for off, or 1 for on: ",
             ),
             ("[ground]\nslip_percent = nan\n", "field.toml, line 2: ground.slip_percent is NaN"),
         ] {

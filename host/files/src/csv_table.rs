@@ -74,7 +74,8 @@ impl CsvTable {
     ) -> Result<Self, FileError> {
         let at = |line: u64, problem: String| FileError::Line { path: path.into(), line, problem };
         let text = decoded(text).map_err(|(line, problem)| at(line, problem))?;
-        let mut text = text.trim_end().to_owned() + "\n";
+        // A quotation mark that is open in the last line then has line breaks in its field, as in any other.
+        let mut text = text.trim_end().to_owned() + "\n#\n#\n";
         let declared = declared_separator(&text);
         if declared.is_some() {
             // Its line stays, without text, so that lines are counted right.

@@ -25,6 +25,7 @@ pub use self::heard::{Counts, Fix, Jump, Mark};
 use self::delay::{LONGEST_DELAY_MS, LeastAhead};
 use crate::plane::Place;
 use crate::sentence::{DAY_MS, Finder, Line, Quality, Report};
+use logbook::follower::WHEEL_GAP_MS;
 use std::collections::BTreeMap;
 
 /// After a jump, fixes are accepted again once they have agreed for this time, in ms.
@@ -42,9 +43,6 @@ const SWAY_M: f64 = 0.25;
 
 /// Greatest ratio of the machine's distance to the wheel's: the machine may skid.
 const SKIDDING: f64 = 1.1;
-
-/// A longer time without a status of the wheel is a gap, in ms.
-pub(crate) const WHEEL_GAP_MS: f64 = 2000.0;
 
 /// The least rise of the delay that may be a step of the receiver's clock, and for how long it must stay, in ms.
 const LEAST_STEP_MS: f64 = 500.0;

@@ -15,6 +15,7 @@
 
 use crate::plane::{Metres, Place, Plane};
 use crate::receiver::Fix;
+use logbook::follower::STANDING_M;
 use strum::{Display, IntoStaticStr};
 
 /// The heading's error that is aimed at, in radians: 20 mm for a metre from the antenna.
@@ -36,9 +37,6 @@ const ROLLED_BACK_M: f64 = 50.0;
 /// How much later than its record an event may have happened, in ms: status, fix and event each have their own delay in
 /// the log.
 const RECORDED_EARLY_MS: f64 = 1000.0;
-
-/// The wheel stands while it rolls less than this, in metres.
-pub(crate) const STANDING_M: f64 = 0.005;
 
 /// An offset from the antenna.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -14,7 +14,7 @@ use serialport::{SerialPortInfo, SerialPortType};
 use std::fs;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
-use toml_edit::{DocumentMut, InlineTable, Item, Value};
+use toml_edit::{DocumentMut, InlineTable, Item, Key, RawString, Value};
 
 /// Longest name of a row, in characters. A phone shows it before the machine.
 pub const NAME_LENGTH: usize = 24;
@@ -201,9 +201,9 @@ pub fn wrong_with(name: &str) -> Option<String> {
     if name.trim() != name || name.starts_with('.') || name.ends_with('.') {
         return Some("it has to begin and end with neither a blank nor a dot".to_owned());
     }
-    if name.chars().any(|character| character.is_control() || r#"/\:*?"<>|="#.contains(character)) {
+    if name.chars().any(|character| character.is_control() || r#"/\:*?"<>|=�"#.contains(character)) {
         return Some(
-            r#"it becomes a file's name, and may have no control character and none of / \ : * ? " < > | ="#.into(),
+            r#"it becomes a file's name, and may have no control character and none of / \ : * ? " < > | = �"#.into(),
         );
     }
     let begin = name.split('.').next().unwrap_or_default().trim_end().to_ascii_lowercase();
@@ -276,12 +276,16 @@ impl Names {
                 return Err(refused("a row is a board's that is known by more than being alone".to_owned()));
             }
         };
-        for row in self.rows.iter().filter(|row| row.board == board && row.name != name) {
-            self.document.remove(&row.name);
+        let before = self.rows.iter().find(|row| row.board == board && row.name != name).map(|row| row.name.clone());
+        if let Some(before) = before {
+            let is_new = self.find(name).is_none();
+            self.rename(&before, is_new.then_some(name));
         }
-        self.rows.retain(|row| row.board != board || row.name == name);
-        let line = InlineTable::from_iter([(key, Value::from(known))]);
-        self.document[name] = Item::Value(Value::InlineTable(line));
+        let mut line = Value::InlineTable(InlineTable::from_iter([(key, Value::from(known))]));
+        if let Some(old) = self.document.get(name).and_then(Item::as_value) {
+            line.decor_mut().clone_from(old.decor());
+        }
+        self.document[name] = Item::Value(line);
         match self.rows.iter_mut().find(|row| row.name == name) {
             Some(row) => row.board = board,
             None => self.rows.push(Row { name: name.to_owned(), board }),
@@ -299,9 +303,33 @@ impl Names {
             let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
             return Err(NamesError::NoRow { path: self.path.clone(), name: name.to_owned(), known });
         };
-        self.document.remove(&name);
-        self.rows.retain(|row| row.name != name);
+        self.rename(&name, None);
         Ok(())
+    }
+
+    /// Gives a row a new name, or removes it. The comments above a removed row stay, above the next one.
+    fn rename(&mut self, old: &str, new: Option<&str>) {
+        let text = |raw: Option<&RawString>| raw.and_then(RawString::as_str).unwrap_or_default().to_owned();
+        let mut carried = String::new();
+        // Each row goes to the end in turn, so the order stays.
+        for mut row in std::mem::take(&mut self.rows) {
+            let Some((mut key, item)) = self.document.remove_entry(&row.name) else { continue };
+            let mut decor = key.leaf_decor().clone();
+            let prefix = std::mem::take(&mut carried) + &text(decor.prefix());
+            if row.name == old {
+                let Some(new) = new else {
+                    carried = prefix;
+                    continue;
+                };
+                key = Key::new(new);
+                new.clone_into(&mut row.name);
+            }
+            decor.set_prefix(prefix);
+            self.document.insert_formatted(&key.with_leaf_decor(decor), item);
+            self.rows.push(row);
+        }
+        let trailing = carried + &text(Some(self.document.trailing()));
+        self.document.set_trailing(trailing);
     }
 
     /// Writes the file, and makes its folder if necessary.
@@ -350,121 +378,4 @@ fn parse(path: &Path, text: &str) -> Result<(DocumentMut, Vec<Row>), FileError> 
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::port::tests::usb;
-
-    const UNO: (u16, u16) = (0x2341, 0x0043);
-
-    fn number(text: &str) -> Board {
-        Board::SerialNumber(text.to_owned())
-    }
-
-    #[test]
-    fn a_board_with_a_number_is_found_at_whichever_port_it_comes_back() {
-        let before = [usb("/dev/ttyACM0", UNO, Some("A1")), usb("/dev/ttyACM1", UNO, Some("B2"))];
-        let after = [usb("/dev/ttyACM1", UNO, Some("A1")), usb("/dev/ttyACM4", UNO, Some("B2"))];
-        assert_eq!(of(&before[0], &before, Path::new("/no-such")), number("A1"));
-        assert_eq!([&before, &after].map(|ports| numbered("A1", ports).unwrap()), ["/dev/ttyACM0", "/dev/ttyACM1"]);
-        let error = numbered("C3", &after).unwrap_err().to_string();
-        assert!(error.starts_with("the board with the serial number C3 is not plugged in"), "{error}");
-    }
-
-    #[test]
-    fn a_number_that_windows_makes_up_is_no_board_s_own() {
-        for (number, elsewhere, on_windows) in [("5", Some("5"), None), ("1A", Some("1A"), None), (" ", None, None)] {
-            assert_eq!([own(number, false), own(number, true)], [elsewhere, on_windows]);
-        }
-        assert_eq!([false, true].map(|on_windows| own(" 85735 ", on_windows)), [Some("85735"); 2]);
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn boards_without_a_number_of_their_own_are_known_by_the_place_where_they_are_plugged_in() {
-        let folder = tempfile::tempdir().unwrap();
-        let folder = fs::canonicalize(folder.path()).unwrap();
-        let [first, second] = ["ttyUSB0", "ttyUSB1"].map(|name| {
-            fs::write(folder.join(name), "").unwrap();
-            folder.join(name).display().to_string()
-        });
-        let places = folder.join("by-path");
-        fs::create_dir(&places).unwrap();
-        std::os::unix::fs::symlink(&first, places.join("usb-0:2:1.0")).unwrap();
-        std::os::unix::fs::symlink(&first, places.join("usbv2-0:2:1.0")).unwrap();
-        let by_place = Board::Port(places.join("usb-0:2:1.0").display().to_string());
-        for number in [None, Some("0001"), Some(" ")] {
-            let ports = [usb(&first, UNO, number), usb(&second, UNO, number)];
-            assert_eq!(of(&ports[0], &ports, &places), by_place);
-            assert_eq!(of(&ports[1], &ports, &places), Board::Port(second.clone()), "it has no link for a socket");
-        }
-        let twins = [usb(&first, UNO, Some("0001")), usb(&second, UNO, Some("0001"))];
-        let error = numbered("0001", &twins).unwrap_err().to_string();
-        assert!(error.contains("are both of the serial number 0001") && error.contains("weeder rows name"), "{error}");
-    }
-
-    #[test]
-    fn names_are_kept_in_their_order_with_the_user_s_comments() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("new/rows.toml");
-        let mut names = Names::read(&path).unwrap();
-        assert!(names.rows().is_empty());
-        names.name("left", number("A1")).unwrap();
-        names.name("right", Board::Port("/dev/pts/7".to_owned())).unwrap();
-        names.write().unwrap();
-        let text = fs::read_to_string(&path).unwrap();
-        assert!(text.ends_with("left = { serial_number = \"A1\" }\nright = { port = \"/dev/pts/7\" }\n"), "{text}");
-        fs::write(&path, text.replace("right =", "# by the hedge\nright =")).unwrap();
-
-        let mut names = Names::read(&path).unwrap();
-        names.name("left", number("C3")).unwrap();
-        names.name("middle", Board::Port("/dev/pts/7".to_owned())).unwrap();
-        let rows: Vec<(&str, &Board)> = names.rows().iter().map(|row| (row.name.as_str(), &row.board)).collect();
-        assert_eq!(rows, [("left", &number("C3")), ("middle", &Board::Port("/dev/pts/7".to_owned()))]);
-        names.write().unwrap();
-        assert_eq!(Names::read(&path).unwrap().rows(), names.rows());
-        names.forget("Middle").unwrap();
-        let error = names.forget("middle").unwrap_err().to_string();
-        assert!(error.ends_with("has no row middle: it has left"), "{error}");
-    }
-
-    #[test]
-    fn a_name_that_could_be_no_file_s_or_another_row_s_is_refused_with_what_would_be_right() {
-        let folder = tempfile::tempdir().unwrap();
-        let mut names = Names::read(&folder.path().join("rows.toml")).unwrap();
-        names.name("Left", number("A1")).unwrap();
-        for (name, problem) in [
-            ("", "1 to 24 characters"),
-            ("a row with a very long name", "1 to 24 characters"),
-            ("a/b", "none of /"),
-            ("1: x", "none of /"),
-            (".hidden", "neither a blank nor a dot"),
-            (" 1", "neither a blank nor a dot"),
-            ("row.", "neither a blank nor a dot"),
-            ("Con", "Windows keeps con for a device"),
-            ("com1.left", "Windows keeps com1 for a device: add a word, as in row-com1"),
-            ("All", "`all` means every row"),
-            ("left", "there is a row Left already"),
-        ] {
-            let error = names.name(name, number("B2")).unwrap_err().to_string();
-            assert!(error.contains(problem), "{name:?}: {error}");
-        }
-        assert_eq!(names.rows().len(), 1);
-    }
-
-    #[test]
-    fn an_error_in_a_file_has_its_line() {
-        let path = Path::new("rows.toml");
-        for (text, problem) in [
-            ("\nleft = 3\n", "rows.toml, line 2: left is `3`: it has to be { serial_number"),
-            ("left = { port = \"\" }\n", "line 1: left is"),
-            ("left = { port = \"a\", serial_number = \"b\" }\n", "line 1: left is"),
-            ("a = { port = \"x\" }\nb = { port = \"x\" }\n", "line 2: b has the board of a"),
-            ("a = { port = \"x\" }\nA = { port = \"y\" }\n", "line 2: there is a row a already"),
-            ("\"a/b\" = { port = \"x\" }\n", "line 1: \"a/b\" cannot be a row's name"),
-            ("left = \n", "line 1: "),
-        ] {
-            let error = parse(path, text).unwrap_err().to_string();
-            assert!(error.contains(problem), "{error}");
-        }
-    }
-}
+mod tests;

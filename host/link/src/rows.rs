@@ -1,8 +1,9 @@
 //! Several rows at once. Each has a [`Connection`] in its own thread, so that no row waits for another.
 //!
-//! [`Rows::open`] opens all rows at the same time. [`Rows::command`] and [`Rows::hold`] send a command to one row.
-//! [`Rows::next`] returns the next event of any row. A lost row is opened again automatically, and its waiting commands
-//! are reported as not typed. Only a `hold` is kept: it is the first line that is typed when the row is back.
+//! [`Rows::open`] opens all rows at the same time, and does not wait. [`Rows::command`] and [`Rows::hold`] send a command
+//! to one row. [`Rows::next`] returns the next event of any row. A lost row is opened again automatically, and its
+//! waiting commands are reported as not typed. Only a `hold` is kept: it is the first line that is typed when the row is
+//! back.
 //!
 //! [`Hold`] follows a HOLD to all rows: which rows have obeyed, and how long the last one took. It has no clock: events
 //! carry their times.
@@ -57,25 +58,22 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// Opens all rows at the same time, and waits until each was tried once. Returns for each row why it is missing.
-    /// Missing rows are tried again, and reported as lost.
-    pub fn open(openers: Vec<Opener>) -> (Self, Vec<Option<LinkError>>) {
+    /// Opens all rows at the same time, and does not wait. The receiver gets each row's number after its first try, and
+    /// why it is missing; `None` if it is connected. Missing rows are tried again, and reported as lost.
+    pub fn open(openers: Vec<Opener>) -> (Self, Receiver<(usize, Option<LinkError>)>) {
         let (sender, heard) = mpsc::channel();
-        let (orders, firsts): (Vec<_>, Vec<_>) = openers
-            .into_iter()
-            .enumerate()
-            .map(|(row, open)| {
-                let (orders, ordered) = mpsc::channel();
-                let (tried, first) = mpsc::channel();
-                let heard = sender.clone();
-                let tell = move |what| heard.send(Heard { row, at: Instant::now(), what }).is_ok();
-                thread::spawn(move || run(open, &ordered, tried, tell));
-                (orders, first)
-            })
-            .unzip();
-        // A thread that panicked has printed why.
-        let missing = firsts.into_iter().map(|first| first.recv().ok().flatten()).collect();
-        (Self { orders, heard }, missing)
+        let (tried, first_tries) = mpsc::channel();
+        let start = |(row, open)| {
+            let (orders, ordered) = mpsc::channel();
+            let (heard, tried) = (sender.clone(), tried.clone());
+            let tell = move |what| heard.send(Heard { row, at: Instant::now(), what }).is_ok();
+            // The receiver is gone if the caller no longer waits.
+            let tried = move |failure| drop(tried.send((row, failure)));
+            thread::spawn(move || run(open, &ordered, tried, tell));
+            orders
+        };
+        let orders = openers.into_iter().enumerate().map(start).collect();
+        (Self { orders, heard }, first_tries)
     }
 
     /// The number of rows.
@@ -120,7 +118,7 @@ impl Rows {
 
 /// A row's thread: runs until all senders of orders and all receivers of events are gone. `tried` gets the result of the
 /// first try. `tell` returns false if the receiver is gone.
-fn run(open: Opener, orders: &Receiver<Order>, tried: Sender<Option<LinkError>>, tell: impl Fn(What) -> bool) {
+fn run(open: Opener, orders: &Receiver<Order>, tried: impl FnOnce(Option<LinkError>), tell: impl Fn(What) -> bool) {
     let mut connection = Connection::waiting_for(open);
     connection.session.keeps_hold = true;
     let mut tried = Some(tried);
@@ -147,9 +145,10 @@ fn run(open: Opener, orders: &Receiver<Order>, tried: Sender<Option<LinkError>>,
             return;
         }
         let failure = connection.session.take_failure();
-        if failure.is_some() || connection.session.is_connected() {
-            // The receiver is gone if the caller no longer waits.
-            tried.take().map(|tried| tried.send(failure));
+        if (failure.is_some() || connection.session.is_connected())
+            && let Some(tried) = tried.take()
+        {
+            tried(failure);
         }
         if !connection.session.is_open() {
             thread::sleep(PAUSE);

@@ -5,7 +5,7 @@
 //! `revert` the values may be missing from the log: they are then unknown until the machine shows them.
 //!
 //! Distances are millimetres by the wheel since the first position of a stretch. A stretch ends with the link, where the
-//! log has a gap, and where the wheel is unknown. With another wheel the distance goes on.
+//! position jumps, and where the wheel is unknown. With another wheel the distance goes on.
 
 use crate::log::{Entry, Kind};
 use control::say::command::{Action, Command};
@@ -16,6 +16,24 @@ use std::f64::consts::PI;
 
 /// The longest distance between two statuses in ticks, some hundred metres.
 const LONGEST_TICKS: u32 = 1_000_000;
+
+/// A longer time without a status of the wheel is a gap, in ms. Statuses come ten times a second.
+pub const WHEEL_GAP_MS: f64 = 2000.0;
+
+/// The wheel stands while it rolls less than this, in metres.
+pub const STANDING_M: f64 = 0.005;
+
+/// A machine rolls at most this far between two statuses, in metres, and in metres for each second. The clocks of some
+/// computers stand still during their sleep.
+const AWAKE_M: f64 = 1.0;
+const AWAKE_M_S: f64 = 5.0;
+
+/// Whether the wheel has rolled this far between two statuses, and it is not known when. The work there is unknown.
+pub fn is_gap(time_ms: f64, rolled_m: f64) -> bool {
+    let rolled_m = rolled_m.abs();
+    let has_slept = rolled_m > AWAKE_M + AWAKE_M_S * time_ms / 1000.0;
+    has_slept || (time_ms > WHEEL_GAP_MS && rolled_m > STANDING_M)
+}
 
 /// Millimetres in a tick of the encoder.
 pub fn tick_mm(settings: &Settings) -> f64 {

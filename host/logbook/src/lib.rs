@@ -1,6 +1,6 @@
 //! A session's log.
 //!
-//! [`log`] writes and reads it. A [`follower`] knows the settings in use, the commands without an answer, restarts and
+//! [`log`] writes and reads it, and [`pieces`] reads it bit by bit. A [`follower`] knows the settings in use, the commands without an answer, restarts and
 //! positions at each of its lines. [`worked`] divides it into the stretches that were worked, and [`replay`] repeats the
 //! firmware's decisions. Maps and pictures of it are made by `gps` and the page.
 //!
@@ -9,5 +9,6 @@
 mod disk;
 pub mod follower;
 pub mod log;
+pub mod pieces;
 pub mod replay;
 pub mod worked;

@@ -4,16 +4,16 @@
 //! the wheel. A change of state has no position: the speed of the last status leads there. Its plants are those that the
 //! tool passed: the beam saw them earlier, by the distance from beam to tool. After rolling back, `start` sees plants
 //! again, and they count once. Detections that are no weeds count as plants, as for the firmware.
+//!
+//! The work in a gap of the statuses is unknown ([`is_gap`]). Nothing but the lines of such a stretch is known, and no
+//! time over the gap: the clocks of some computers stand still during their sleep.
 
-use crate::follower::{Followed, Follower};
+use crate::follower::{Followed, Follower, WHEEL_GAP_MS, is_gap};
 use crate::log::Entry;
 use control::ground::class::Class;
 use link::settings::Setting;
 use link::{EventLine, Mode};
 use std::ops::Range;
-
-/// The speed of a status holds for so long at most, in ms. Statuses come ten times a second.
-const NEAR_MS: u64 = 1000;
 
 /// Rolling back farther than this in hold leads to another row, in metres.
 pub const NEXT_ROW_M: f64 = 2.0;
@@ -25,15 +25,17 @@ pub struct Worked {
     pub lines: Range<u64>,
     /// How often the log was opened again before it. The log's clock then begins again.
     pub session: u32,
+    /// Gaps of the statuses in the log before it, and until its end.
+    pub gaps: Range<u32>,
     /// Its time by the log's clock, in milliseconds.
     pub time_ms: Range<u64>,
     /// The part of it in which the machine rolled.
     pub rolled_ms: u64,
     /// Net distance by the wheel in mm. `None` if a part of it is unknown.
     pub distance_mm: Option<f64>,
-    /// Plants that the tool passed. `None` if the distance is unknown.
+    /// Plants that the tool passed. `None` if the distance is unknown, or the beam missed a part of the ground.
     pub plants: Option<u32>,
-    /// Swings out of the row.
+    /// Swings out of the row that the log has.
     pub swings: u32,
 }
 
@@ -55,37 +57,49 @@ struct Open {
 
 /// Divides a log into its stretches of work.
 pub fn worked(log: &[Entry]) -> Vec<Worked> {
-    let mut stretches = Vec::new();
+    let mut stretches: Vec<Worked> = Vec::new();
     let mut follower = Follower::default();
     let mut open: Option<Open> = None;
     // The plants since the distance began, from leading to trailing edge, and the row's farthest status.
     let (mut plants_mm, mut row_mm): (Vec<Range<f64>>, f64) = (Vec::new(), f64::NEG_INFINITY);
-    // The last status: its time, its distance in mm, and its speed in mm/s.
-    let mut last: Option<(u64, f64, f64)> = None;
+    // The last status: its line, its time, its distance in mm, and its speed in mm/s.
+    let mut last: Option<(u64, u64, f64, f64)> = None;
+    // The gaps of the statuses so far, and the end of the last one: the beam may have missed plants before it.
+    let (mut gaps, mut missed_mm) = (0, f64::NEG_INFINITY);
     let (mut session, mut before_ms, mut was_work) = (0, 0, false);
     for entry in log {
         session += u32::from(entry.time_ms < before_ms);
         before_ms = entry.time_ms;
+        let gaps_before = gaps;
         let followed = follower.take(entry);
         let mut now_mm = None;
         let mode = match &followed {
             Followed::Linked => None,
             Followed::Status(status, goes_on) => {
                 if !goes_on {
-                    (plants_mm, row_mm) = (Vec::new(), f64::NEG_INFINITY);
+                    (plants_mm, row_mm, missed_mm) = (Vec::new(), f64::NEG_INFINITY, f64::NEG_INFINITY);
                 }
                 now_mm = follower.mm(status.position);
+                if let (Some((line, time_ms, mm, _)), Some(now_mm)) = (last, now_mm)
+                    && (!goes_on || is_gap(entry.time_ms.saturating_sub(time_ms) as f64, (now_mm - mm) / 1000.0))
+                {
+                    (gaps, missed_mm) = (gaps + 1, missed_mm.max(now_mm));
+                    // An event may have come in the gap, and ended a stretch.
+                    for ended in stretches.iter_mut().filter(|ended| ended.lines.end > line + 1) {
+                        (ended.gaps.end, ended.distance_mm, ended.plants) = (gaps, None, None);
+                    }
+                }
                 let is_work = status.mode == Mode::Work;
                 if let Some(mm) = now_mm.filter(|_| is_work && !was_work && status.unseen_mm > 0) {
                     // `start` has forgotten the ground: the beam sees again the plants that end ahead of it.
                     let is_next_row = row_mm - mm > 1000.0 * NEXT_ROW_M;
                     plants_mm.retain(|plant_mm| plant_mm.end < mm && !is_next_row);
-                    row_mm = if is_next_row { mm } else { row_mm };
+                    (row_mm, missed_mm) = (if is_next_row { mm } else { row_mm }, f64::NEG_INFINITY);
                 }
                 row_mm = now_mm.map_or(row_mm, |mm| row_mm.max(mm));
                 was_work = is_work;
                 let speed_mm_s = f64::from(status.speed_mm_s);
-                last = now_mm.map(|mm| (entry.time_ms, mm, speed_mm_s));
+                last = now_mm.map(|mm| (entry.number, entry.time_ms, mm, speed_mm_s));
                 open.iter_mut().for_each(|open| open.take(entry.time_ms, now_mm, speed_mm_s, *goes_on));
                 Some(status.mode)
             }
@@ -102,10 +116,14 @@ pub fn worked(log: &[Entry]) -> Vec<Worked> {
             }
             _ => continue,
         };
-        let near = last.filter(|(time_ms, ..)| entry.time_ms.saturating_sub(*time_ms) <= NEAR_MS);
-        if let (Followed::Event(_), Some((time_ms, mm, speed_mm_s))) = (&followed, near) {
-            now_mm = Some(mm + speed_mm_s * entry.time_ms.saturating_sub(time_ms) as f64 / 1000.0);
-            open.iter_mut().for_each(|open| open.take(entry.time_ms, now_mm, speed_mm_s, true));
+        if let (Followed::Event(_), Some((_, time_ms, mm, speed_mm_s))) = (&followed, last) {
+            let since_ms = entry.time_ms.saturating_sub(time_ms) as f64;
+            if since_ms <= WHEEL_GAP_MS {
+                now_mm = Some(mm + speed_mm_s * since_ms / 1000.0);
+                open.iter_mut().for_each(|open| open.take(entry.time_ms, now_mm, speed_mm_s, true));
+            } else {
+                gaps += u32::from(open.is_some());
+            }
         }
         if let Some(open) = &mut open
             && mode.is_some()
@@ -113,25 +131,27 @@ pub fn worked(log: &[Entry]) -> Vec<Worked> {
             (open.worked.time_ms.end, open.worked.lines.end) = (entry.time_ms, entry.number + 1);
         }
         match (mode == Some(Mode::Work), open.is_some()) {
-            (true, false) => open = Some(Open::at(entry, session, now_mm)),
+            (true, false) => open = Some(Open::at(entry, session, gaps_before, now_mm)),
             (false, true) => {
-                stretches.extend(open.take().map(|open| open.end(&plants_mm, &follower)));
+                stretches.extend(open.take().map(|open| open.end(&plants_mm, missed_mm, gaps, &follower)));
             }
             _ => {}
         }
         if mode.is_none() {
-            (plants_mm, row_mm, last) = (Vec::new(), f64::NEG_INFINITY, None);
+            (plants_mm, row_mm, missed_mm) = (Vec::new(), f64::NEG_INFINITY, f64::NEG_INFINITY);
+            last = None;
         }
     }
-    stretches.extend(open.map(|open| open.end(&plants_mm, &follower)));
+    stretches.extend(open.map(|open| open.end(&plants_mm, missed_mm, gaps, &follower)));
     stretches
 }
 
 impl Open {
-    fn at(entry: &Entry, session: u32, now_mm: Option<f64>) -> Self {
+    fn at(entry: &Entry, session: u32, gaps: u32, now_mm: Option<f64>) -> Self {
         let worked = Worked {
             lines: entry.number..entry.number + 1,
             session,
+            gaps: gaps..gaps,
             time_ms: entry.time_ms..entry.time_ms,
             ..Worked::default()
         };
@@ -150,15 +170,19 @@ impl Open {
         }
     }
 
-    fn end(self, plants_mm: &[Range<f64>], follower: &Follower) -> Worked {
+    /// `gaps` are those in the log so far, and the beam may have missed plants before `missed_mm`.
+    fn end(self, plants_mm: &[Range<f64>], missed_mm: f64, gaps: u32, follower: &Follower) -> Worked {
         let beam_to_tool_mm = f64::from(follower.in_use().settings().get(Setting::BeamToToolMm));
-        let beam_mm = self.beam_mm.filter(|_| self.goes_on);
+        let gaps = self.worked.gaps.start..gaps;
+        let beam_mm = self.beam_mm.filter(|_| self.goes_on && gaps.is_empty());
         let passed = |ground_mm: &Range<f64>| {
             let tool_mm = ground_mm.start - beam_to_tool_mm..ground_mm.end - beam_to_tool_mm;
-            plants_mm.iter().filter(|plant_mm| tool_mm.contains(&plant_mm.start)).count() as u32
+            let passed = plants_mm.iter().filter(|plant_mm| tool_mm.contains(&plant_mm.start));
+            (tool_mm.start >= missed_mm).then(|| passed.count() as u32)
         };
         Worked {
-            plants: beam_mm.as_ref().map(passed),
+            gaps,
+            plants: beam_mm.as_ref().and_then(passed),
             distance_mm: beam_mm.map(|ground_mm| ground_mm.end - ground_mm.start),
             ..self.worked
         }
@@ -224,12 +248,12 @@ mod tests {
         let rolling = format!("0,status,{}\n", status("hold", 0, 500))
             + "40,event,state is=work\n"
             + &format!("100,status,{}\n", status("work", 50, 500))
-            + &format!("10000,status,{}\n", status("work", 5000, 500))
-            + "10060,event,state is=hold\n";
+            + &format!("2100,status,{}\n", status("work", 1050, 500))
+            + "2160,event,state is=hold\n";
         let (_, again) = HEAD.split_once('\n').expect("it has a header");
         let found = of(&format!("{HEAD}{rolling}{again}{rolling}"));
         let found: Vec<_> = found.iter().map(|of| (of.session, of.distance_mm, of.rolled_ms)).collect();
-        assert_eq!(found, [(0, Some(5010.0), 10_020), (1, Some(5010.0), 10_020)]);
+        assert_eq!(found, [(0, Some(1060.0), 2120), (1, Some(1060.0), 2120)]);
     }
 
     #[test]
@@ -246,6 +270,48 @@ mod tests {
             let unknown = of(&format!("{HEAD}0,setting,ticks_per_m=0\n{unknown}{at_work}"));
             assert_eq!(unknown.len(), 1);
             assert_eq!((unknown[0].distance_mm, unknown[0].plants, unknown[0].speed_km_h()), (None, None, None));
+        }
+    }
+
+    #[test]
+    fn the_work_in_a_gap_of_the_statuses_is_unknown_even_if_the_clock_stood_or_events_came() {
+        // The machine rolls a metre a second past a plant each half metre. It is at work from 2 s to 12 s, and from 16 s
+        // to 26 s.
+        for (gap_ms, are_known) in [
+            (0..0, [(true, true), (true, true)]),
+            (5000..9000, [(false, false), (true, true)]),
+            (11_000..13_500, [(false, false), (true, true)]),
+            (13_000..17_000, [(true, true), (false, false)]),
+            // At the second start the tool is 400 mm behind the beam.
+            (12_500..15_000, [(true, true), (true, true)]),
+            (12_500..15_900, [(true, true), (true, false)]),
+        ] {
+            for (is_asleep, has_events) in [(false, false), (false, true), (true, false), (true, true)] {
+                let mut text = HEAD.to_owned();
+                for at_ms in (0..28_000_u64).step_by(100) {
+                    let is_in_gap = gap_ms.contains(&at_ms);
+                    let slept_ms = if is_asleep { at_ms.clamp(gap_ms.start, gap_ms.end) - gap_ms.start } else { 0 };
+                    let mut line = |kind: &str, said: &str| {
+                        writeln!(text, "{},{kind},{said}", at_ms - slept_ms).expect("a string takes all");
+                    };
+                    let is_work = (2000..12_000).contains(&at_ms) || (16_000..26_000).contains(&at_ms);
+                    let mode = if is_work { "work" } else { "hold" };
+                    if [2000, 12_000, 16_000, 26_000].contains(&at_ms) && (has_events || !is_in_gap) {
+                        line("event", &format!("state is={mode}"));
+                    }
+                    if at_ms % 500 == 0 && (has_events || !is_in_gap) {
+                        line("event", &format!("plant pos={at_ms} votes=3 spacing=0 delay=0 hold=0 actuation=0"));
+                    }
+                    if !is_in_gap {
+                        line("status", &status(mode, at_ms as i64, 1000));
+                    }
+                }
+                let found = of(&text);
+                let found: Vec<_> = found.iter().map(|of| (of.gaps.is_empty(), of.distance_mm, of.plants)).collect();
+                let expected = are_known
+                    .map(|(is_known, has_plants)| (is_known, is_known.then_some(10_000.0), has_plants.then_some(20)));
+                assert_eq!(found, expected, "{gap_ms:?} {is_asleep} {has_events}");
+            }
         }
     }
 

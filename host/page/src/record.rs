@@ -4,7 +4,8 @@
 //! it. [`picture`] needs each line once, so no line is kept for it.
 //!
 //! Distances are millimetres of the tool's travel since the start of the log, by the wheel. After a reset, or for
-//! another machine, the ground continues one metre farther. An event without a position has that of the line before.
+//! another machine, the ground continues one metre farther. An event without a position has that of the line before. Over
+//! a gap of the statuses the work is unknown, and the tool is not drawn in the row.
 //!
 //! After `revert` the settings can be missing ([`logbook::follower`]): a log of an earlier version has them only if `save`
 //! was typed before. Then the picture stops, and says when. It goes on where `get` has shown the values, or at the next
@@ -14,8 +15,9 @@ use gps::job::{Job, Wanted};
 use gps::picture::{Words, draw};
 use link::settings::Setting;
 use link::{Class, EventLine, Mode, Values};
-use logbook::follower::{Followed, Follower};
-use logbook::log::{Entry, Kind, Pieces};
+use logbook::follower::{Followed, Follower, is_gap};
+use logbook::log::{Entry, Kind};
+use logbook::pieces::Pieces;
 use logbook::replay;
 use serde_json::{Value, json};
 use std::cell::RefCell;
@@ -32,9 +34,9 @@ const APART_MM: f64 = 1000.0;
 #[derive(Default)]
 struct Picture {
     follower: Follower,
-    /// Where the ground of the stretch begins, its last status, and the farthest position so far.
+    /// Where the ground of the stretch begins, time and position of its last status, and the farthest position so far.
     start_mm: f64,
-    here_mm: Option<f64>,
+    here: Option<(u64, f64)>,
     end_mm: f64,
     /// Position and state of the last stored speed of the stretch.
     shown: Option<(f64, Mode)>,
@@ -47,6 +49,8 @@ struct Picture {
     swings: usize,
     /// The tool's positions, each with whether it is out from there on.
     changes: Vec<(f64, bool)>,
+    /// Those before the last status.
+    known: usize,
     has_places: bool,
     alarms: Vec<Value>,
     tables: [Vec<f64>; 3],
@@ -83,7 +87,8 @@ impl Picture {
                     self.end_stretch();
                 }
                 let here_mm = self.tool_mm(status.position);
-                self.here_mm = Some(here_mm);
+                self.leave_gap(here_mm);
+                (self.here, self.known) = (Some((self.time_ms, here_mm)), self.changes.len());
                 let is_near = |(mm, mode): (f64, Mode)| (here_mm - mm).abs() < SPEED_MM && mode == status.mode;
                 if self.shown.is_some_and(is_near) {
                     return;
@@ -105,9 +110,19 @@ impl Picture {
         tool_mm
     }
 
+    /// Takes the tool out over a gap between the last status and one at this position.
+    fn leave_gap(&mut self, to_mm: f64) {
+        let Some((from_ms, from_mm)) = self.here else { return };
+        if is_gap((self.time_ms - from_ms) as f64, (to_mm - from_mm) / 1000.0) {
+            self.changes.truncate(self.known);
+            self.changes.push((from_mm.min(to_mm), true));
+            self.shown = None;
+        }
+    }
+
     /// Ends the ground of a wheel's counts. What follows begins farther on.
     fn end_stretch(&mut self) {
-        if self.here_mm.take().is_some() {
+        if self.here.take().is_some() {
             self.changes.push((self.end_mm, true));
             self.end_mm += APART_MM;
         }
@@ -145,7 +160,7 @@ impl Picture {
                 self.changes.push((mm, true));
             }
             EventLine::Warning { .. } => {
-                let mm = self.here_mm.unwrap_or(self.end_mm);
+                let mm = self.here.map_or(self.end_mm, |(_, mm)| mm);
                 self.alarms.push(trouble(mm, true));
             }
             // An alarm puts the tool out, and a start may let it in: the swing reports it.
@@ -425,6 +440,18 @@ mod tests {
         // A reset takes the tool out.
         let picture = shown(&changed("2000,lost,pulled\n2000,connected,0.2.0\n"), 64);
         assert_eq!(rows(&picture, WORKED), [[0.0, 500.0]]);
+    }
+
+    #[test]
+    fn over_a_gap_of_the_statuses_the_tool_is_not_drawn_in_the_row() {
+        let before = [status(0, "in", 0), status(1000, "in", 1000)].concat();
+        let swings = "1000,event,swing tool=out pos=1500\n1000,event,swing tool=in pos=2000\n";
+        // The clock of a computer that sleeps stands still.
+        for (swings, time_ms) in [("", 1300), ("", 8000), (swings, 1300), (swings, 8000)] {
+            let behind = [status(time_ms, "in", 5000), status(time_ms + 1000, "in", 6000)].concat();
+            let picture = shown(&format!("{BEGIN}0,setting,ticks_per_m=1000\n{before}{swings}{behind}"), 64);
+            assert_eq!(rows(&picture, WORKED), [[0.0, 1000.0], [5000.0, 6000.0]], "{swings} {time_ms}");
+        }
     }
 
     #[test]

@@ -154,7 +154,8 @@ mod tests {
             (hex(0, &[1]), "is no bootloader for the ATmega328P"),
             (hex(0x7900, &[1]), "is no bootloader for the ATmega328P"),
             (hex(0x7E00, &[0; 0x210]), "from 0x7e00 to 0x8010"),
-            (String::new(), "is empty"),
+            (hex(0, &[]), "is empty"),
+            (String::new(), "it has no end record"),
             ("no hex\n".to_owned(), "is no Intel HEX file"),
         ] {
             let error = read(&text).unwrap_err();

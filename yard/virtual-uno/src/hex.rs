@@ -2,7 +2,7 @@
 
 use crate::file_error::FileError;
 use crate::memory::FLASH_BYTES;
-use ihex::{Reader, ReaderError, Record};
+use ihex::{Reader, Record};
 use std::ops::Range;
 use std::path::Path;
 
@@ -37,11 +37,12 @@ pub(crate) fn flash(path: &Path, content: &[u8]) -> Result<Vec<u8>, FileError> {
 }
 
 /// From the lowest to the highest address that a file fills, and the flash with those of its bytes that are in flash.
-pub(crate) fn filled(text: &str) -> Result<(Range<usize>, Vec<u8>), ReaderError> {
+/// Fails with the reason if a record is wrong, or the file ends without its end record.
+pub(crate) fn filled(text: &str) -> Result<(Range<usize>, Vec<u8>), String> {
     let (mut base, mut first, mut end) = (0, usize::MAX, 0);
     let mut flash = vec![0xFF; FLASH_BYTES];
     for record in Reader::new(text) {
-        match record? {
+        match record.map_err(|error| error.to_string())? {
             Record::Data { offset, value } => {
                 let start = base + usize::from(offset);
                 let behind = start + value.len();
@@ -53,10 +54,11 @@ pub(crate) fn filled(text: &str) -> Result<(Range<usize>, Vec<u8>), ReaderError>
             Record::ExtendedSegmentAddress(segment) => base = usize::from(segment) << 4,
             Record::ExtendedLinearAddress(upper) => base = usize::from(upper) << 16,
             // Start addresses are for Intel's processors.
-            Record::StartSegmentAddress { .. } | Record::StartLinearAddress(_) | Record::EndOfFile => {}
+            Record::StartSegmentAddress { .. } | Record::StartLinearAddress(_) => {}
+            Record::EndOfFile => return Ok((first..end, flash)),
         }
     }
-    Ok((first..end, flash))
+    Err("it has no end record (:00000001FF)".to_owned())
 }
 
 #[cfg(test)]
@@ -70,9 +72,13 @@ mod tests {
         let whole = text(&firmware);
         assert_eq!(read(&whole), Ok(firmware));
         let mega = ":020000040001F9\n:0100000000FF\n:00000001FF\n";
-        for (text, why) in
-            [(&whole[..whole.len() / 2 + 5], "no whole Intel HEX"), (mega, "fills 65537 bytes"), (":", "")]
-        {
+        let (cut_at_a_line, _) = whole.trim_end().rsplit_once('\n').unwrap();
+        for (text, why) in [
+            (&whole[..whole.len() / 2 + 5], "no whole Intel HEX"),
+            (cut_at_a_line, "no whole Intel HEX file: it has no end record"),
+            (mega, "fills 65537 bytes"),
+            (":", ""),
+        ] {
             let error = read(text).unwrap_err();
             assert!(error.contains(why), "{error}");
         }

@@ -9,7 +9,9 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, ErrorKind, Read, Write};
 use std::path::Path;
-use vcd::{Command, IdCode, Parser, Scope, ScopeItem, SimulationCommand, TimescaleUnit, Value, Var, Writer};
+use vcd::{
+    Command, IdCode, Parser, ReferenceIndex, Scope, ScopeItem, SimulationCommand, TimescaleUnit, Value, Var, Writer,
+};
 
 /// Longest recording, in hours. The firmware would take days to play a longer one.
 const MOST_HOURS: u64 = 24;
@@ -217,13 +219,16 @@ fn to_cycles(time: u64, (count, unit): (u32, TimescaleUnit)) -> u64 {
     u64::try_from((units + divisor / 2) / divisor).unwrap_or(u64::MAX)
 }
 
-/// Every channel with its scopes, as `scope.name`.
+/// Every channel with its scopes, as `scope.name`. One bit of a bus is `scope.name[0]`.
 fn list_channels(scope: &str, items: &[ScopeItem], known: &mut Vec<(String, Var)>) {
     for item in items {
         match item {
             ScopeItem::Var(channel) => {
                 let mut channel = channel.clone();
                 channel.reference = channel.reference.replace(BLANK, " ");
+                if let Some(bit @ ReferenceIndex::BitSelect(_)) = channel.index {
+                    channel.reference += &bit.to_string();
+                }
                 known.push((format!("{scope}{}", channel.reference), channel));
             }
             ScopeItem::Scope(Scope { identifier, items, .. }) => {
@@ -337,6 +342,14 @@ mod tests {
         assert!(error(&with_b("A")).contains("given for two signals"));
         assert!(error(&[CHANNELS[0], CHANNELS[1], (Pin::D8, "B")]).contains("given for two signals"));
         assert!(levels(&file, &[(Pin::D2, "analyser.A"), CHANNELS[1]]).is_ok());
+    }
+
+    #[test]
+    fn the_bits_of_a_bus_are_channels_of_their_own() {
+        let expected = levels(recording("1 us", "#0 0! 1\" #5 1!"), &CHANNELS);
+        let file = recording("1 us", "#0 0! 1\" #5 1!").replace("! A", "! D [0]").replace("\" B", "\" D [1]");
+        assert_eq!(levels(&file, &[(Pin::D2, "D[0]"), (Pin::D3, "analyser.D[1]")]), expected);
+        assert_eq!(levels(&file, &CHANNELS).unwrap_err(), "pins.vcd has no channel `A`; it has `D[0]`, `D[1]`, `bus`");
     }
 
     #[test]

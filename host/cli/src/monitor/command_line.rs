@@ -11,12 +11,12 @@ use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 /// Lines remembered.
 const HISTORY: usize = 100;
 
-/// A line that is being typed. All characters are printable ASCII, one byte each.
+/// A line that is being typed. A row's name in it may have characters of any language.
 #[derive(Clone, Debug, Default)]
 pub struct CommandLine {
     /// The characters typed.
     pub text: String,
-    /// Number of characters before the cursor.
+    /// Number of bytes before the cursor, which stands between two characters.
     pub cursor: usize,
     history: Vec<String>,
     /// The shown line of the history, counted from the newest. `None` for a new line.
@@ -34,9 +34,15 @@ impl CommandLine {
 
     /// The beginning of the command: after a row's name and colon, if they are typed.
     fn command_start(&self) -> usize {
-        let Some(colon) = self.text.find(':').filter(|&colon| colon <= NAME_LENGTH) else { return 0 };
+        let is_name = |&colon: &usize| self.text[..colon].chars().count() <= NAME_LENGTH;
+        let Some(colon) = self.text.find(':').filter(is_name) else { return 0 };
         let behind = &self.text[colon + 1..];
         colon + 1 + usize::from(behind.starts_with(' '))
+    }
+
+    /// Length of the character before the cursor, in bytes; 0 at the beginning.
+    fn before(&self) -> usize {
+        self.text[..self.cursor].chars().next_back().map_or(0, char::len_utf8)
     }
 
     /// Handles a key. Returns the line when it is entered.
@@ -45,25 +51,31 @@ impl CommandLine {
             return None;
         }
         self.candidates.clear();
-        let is_typed = key.modifiers.difference(KeyModifiers::SHIFT).is_empty();
+        let pressed = key.modifiers.difference(KeyModifiers::SHIFT);
+        // Windows sends AltGr as Ctrl and Alt. A letter of ASCII with both is a shortcut.
+        let is_typed = |letter: char| {
+            pressed.is_empty() || !letter.is_ascii() && pressed == KeyModifiers::CONTROL.union(KeyModifiers::ALT)
+        };
         match key.code {
             // A terminal in raw mode has these for a pasted LF and for CR. The LF of both enters an empty line.
             KeyCode::Char('j' | 'm') if key.modifiers == KeyModifiers::CONTROL => return self.enter(),
             KeyCode::Char('u') if key.modifiers == KeyModifiers::CONTROL => self.clear(),
-            KeyCode::Char(_) if !is_typed => {}
-            KeyCode::Char(character @ ' '..='~') if self.text.len() < self.most() => {
-                self.text.insert(self.cursor, character);
-                self.cursor += 1;
+            KeyCode::Char(letter) if !is_typed(letter) || letter.is_control() => {}
+            KeyCode::Char(letter) if self.text.len() < self.most() => {
+                self.text.insert(self.cursor, letter);
+                self.cursor += letter.len_utf8();
             }
             KeyCode::Backspace if self.cursor > 0 => {
-                self.cursor -= 1;
+                self.cursor -= self.before();
                 self.text.remove(self.cursor);
             }
             KeyCode::Delete if self.cursor < self.text.len() => {
                 self.text.remove(self.cursor);
             }
-            KeyCode::Left => self.cursor = self.cursor.saturating_sub(1),
-            KeyCode::Right => self.cursor = self.text.len().min(self.cursor + 1),
+            KeyCode::Left => self.cursor -= self.before(),
+            KeyCode::Right => {
+                self.cursor += self.text[self.cursor..].chars().next().map_or(0, char::len_utf8);
+            }
             KeyCode::Home => self.cursor = 0,
             KeyCode::End => self.cursor = self.text.len(),
             KeyCode::Up => self.browse(self.browsed.map_or(0, |place| place + 1)),
@@ -226,9 +238,25 @@ mod tests {
     }
 
     #[test]
+    fn a_row_s_name_in_any_language_is_typed_and_edited() {
+        let mut line = CommandLine::default();
+        typed(&mut line, "s\u{fc}d \u{921}: set lead_o\t");
+        assert_eq!(line.text, "s\u{fc}d \u{921}: set lead_out_ms ");
+        line.key(KeyCode::Home.into());
+        line.key(KeyCode::Right.into());
+        line.key(KeyCode::Right.into());
+        line.key(KeyCode::Left.into());
+        line.key(KeyCode::Delete.into());
+        typed(&mut line, "\u{e9}");
+        line.key(KeyEvent::new(KeyCode::Char('\u{105}'), KeyModifiers::CONTROL | KeyModifiers::ALT));
+        line.key(KeyCode::Backspace.into());
+        assert_eq!((line.text.as_str(), line.cursor), ("s\u{e9}d \u{921}: set lead_out_ms ", 3));
+    }
+
+    #[test]
     fn invalid_lines_are_not_typed() {
         let mut line = CommandLine::default();
-        typed(&mut line, "h\u{e4}ld\u{1b}");
+        typed(&mut line, "h\u{1b}ld");
         assert_eq!(line.text, "hld");
         typed(&mut line, &"x".repeat(200));
         assert_eq!(line.text.len(), COMMAND_LENGTH);

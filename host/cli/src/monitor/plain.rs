@@ -5,8 +5,8 @@
 //! row.
 //!
 //! A script keeps its order, because it may set values and then hold. But if an answer does not come, a `hold` behind it
-//! goes first, and the lines between are not sent. An output or a log that fails does not end the session before the
-//! input: a `hold` may still come.
+//! goes first, and the lines between are not sent. At the start, lines wait until each row was tried; a `hold` that is
+//! first does not. An output or a log that fails does not end the session before the input: a `hold` may still come.
 
 use super::addressed;
 use crate::input::{self, Line};
@@ -33,20 +33,24 @@ const LOOK: Duration = Duration::from_millis(20);
 /// Time without a line of an awaited answer after which a `hold` goes first.
 const STALLED: Duration = Duration::from_millis(500);
 
+/// The same while rows are not tried yet: an old bootloader may start seconds after the other rows.
+const OPENING: Duration = Duration::from_secs(3);
+
 /// Longest wait for the two statuses after the last answer. Another version's status may not be known.
 const LONGEST_REPORT: Duration = Duration::from_secs(2);
 
-/// Goes on until the input has ended and its last command has been answered; bad where one was refused. `are_there`
-/// says which rows were there when they were opened. Fails if a line was not sent, an Uno goes away with commands
-/// unanswered, or output or log fail.
-pub fn run(rows: &Rows, are_there: &[bool], chosen: &Chosen, logs: Option<Logs>) -> Result<Finding> {
-    Talk::new(rows, are_there, chosen, logs).run(&input::typed(), &mut io::stdout().lock())
+/// Goes on until the input has ended and its last command has been answered; bad where one was refused. The row
+/// `connected` is there, and the others may not be tried yet. Fails if a line was not sent, an Uno goes away with
+/// commands unanswered, or output or log fail.
+pub fn run(rows: &Rows, connected: usize, chosen: &Chosen, logs: Option<Logs>) -> Result<Finding> {
+    Talk::new(rows, connected, chosen, logs).run(&input::typed(), &mut io::stdout().lock())
 }
 
 /// How a row stands.
 #[derive(Default)]
 struct Standing {
-    is_there: bool,
+    /// `None` before the end of the first try.
+    is_there: Option<bool>,
     /// Commands that are not answered. Several holds may have one answer.
     unanswered: Vec<String>,
     /// Statuses since the last answer.
@@ -77,8 +81,10 @@ struct Talk<'a> {
 }
 
 impl<'a> Talk<'a> {
-    fn new(rows: &'a Rows, are_there: &[bool], chosen: &'a Chosen, logs: Option<Logs>) -> Self {
-        let standing = are_there.iter().map(|&is_there| Standing { is_there, ..Standing::default() }).collect();
+    fn new(rows: &'a Rows, connected: usize, chosen: &'a Chosen, logs: Option<Logs>) -> Self {
+        let is_there = |row| (row == connected).then_some(true);
+        let standing = |row| Standing { is_there: is_there(row), ..Standing::default() };
+        let standing = (0..rows.count()).map(standing).collect();
         Self {
             rows,
             chosen,
@@ -104,9 +110,12 @@ impl<'a> Talk<'a> {
                     Err(TryRecvError::Empty) => break,
                 }
             }
-            let next = if self.is_idle() {
+            let is_opening = self.standing.iter().any(|row| row.is_there.is_none());
+            let is_next = self.is_idle() || is_opening && self.waiting.front().is_some_and(|line| self.is_hold(line));
+            let patience = if is_opening { OPENING } else { STALLED };
+            let next = if is_next {
                 self.waiting.pop_front()
-            } else if self.moved_at.elapsed() > STALLED {
+            } else if self.moved_at.elapsed() > patience {
                 self.take_hold()
             } else {
                 None
@@ -118,7 +127,7 @@ impl<'a> Talk<'a> {
             let ended = has_all && self.waiting.is_empty();
             // Two statuses after a command, all its events have come.
             let is_late = self.moved_at.elapsed() > LONGEST_REPORT;
-            let has_reported = |row: &Standing| !row.is_there || row.statuses >= 2 || is_late;
+            let has_reported = |row: &Standing| row.is_there == Some(false) || row.statuses >= 2 || is_late;
             if ended && self.is_idle() && self.standing.iter().all(has_reported) {
                 return self.end();
             }
@@ -128,7 +137,7 @@ impl<'a> Talk<'a> {
     }
 
     fn is_idle(&self) -> bool {
-        self.standing.iter().all(|row| row.unanswered.is_empty())
+        self.standing.iter().all(|row| row.is_there.is_some() && row.unanswered.is_empty())
     }
 
     /// The finding of the whole session.
@@ -143,12 +152,14 @@ impl<'a> Talk<'a> {
         Ok(self.finding)
     }
 
+    /// Whether a line is `hold`, to one row or to all.
+    fn is_hold(&self, line: &Line) -> bool {
+        addressed(&line.text, &self.chosen.names(), None).is_ok_and(|(_, command)| link::is_hold(command))
+    }
+
     /// Refuses the lines before the first waiting `hold`, and returns that.
     fn take_hold(&mut self) -> Option<Line> {
-        let names = self.chosen.names();
-        let is_hold =
-            |line: &Line| addressed(&line.text, &names, None).is_ok_and(|(_, command)| link::is_hold(command));
-        let place = self.waiting.iter().position(is_hold)?;
+        let place = self.waiting.iter().position(|line| self.is_hold(line))?;
         for line in self.waiting.drain(..place).collect::<Vec<_>>() {
             self.refuse(&line, "hold came first");
         }
@@ -192,11 +203,11 @@ impl<'a> Talk<'a> {
         };
         let to = to.map_or(0..self.rows.count(), |row| row..row + 1);
         if self.chosen.are_several && to.len() == self.rows.count() && link::is_hold(command) {
-            self.hold = Some(Hold::new(Instant::now(), self.standing.iter().map(|row| row.is_there)));
+            self.hold = Some(Hold::new(Instant::now(), self.standing.iter().map(|row| row.is_there != Some(false))));
         }
         for row in to {
             let standing = &mut self.standing[row];
-            if !standing.is_there {
+            if standing.is_there == Some(false) {
                 standing.has_failed = true;
                 self.print(&self.chosen.under_name(row, "error: the row is not there"), output);
                 if link::is_hold(command) {
@@ -214,15 +225,15 @@ impl<'a> Talk<'a> {
     fn take(&mut self, heard: &Heard, ended: bool, output: &mut impl Write) -> Result<()> {
         let row = heard.row;
         let standing = &mut self.standing[row];
-        if let (Some(logs), What::Happened(happening)) = (&mut self.logs, &heard.what) {
-            let written = logs.write(row, |log| log.write(log.now_ms(), happening));
+        if let Some(logs) = &mut self.logs {
+            let written = logs.take(heard);
             // It prints the error. The session goes on, even without any log.
             let _ = logs.go_on_after(written, row, self.chosen);
         }
         let mut said = None;
         match &heard.what {
             What::Happened(Happening::Connected { version, shown, .. }) => {
-                standing.is_there = true;
+                standing.is_there = Some(true);
                 if let Some(other) = other_version(version, shown) {
                     tell!("{}", self.chosen.under_name(row, &other));
                 }
@@ -237,7 +248,7 @@ impl<'a> Talk<'a> {
             What::Happened(Happening::Lost(why)) => {
                 let was_idle = standing.unanswered.is_empty();
                 standing.has_failed |= !was_idle;
-                (standing.is_there, standing.unanswered) = (false, Vec::new());
+                (standing.is_there, standing.unanswered) = (Some(false), Vec::new());
                 ensure!(self.chosen.are_several || was_idle && !ended, "{why}");
                 tell!("{}", self.chosen.under_name(row, why));
             }
@@ -320,8 +331,8 @@ mod tests {
 
     /// The only row, whose port is at this board.
     fn only_row(open: Opener) -> (Rows, Chosen) {
-        let (rows, missing) = Rows::open(vec![open]);
-        assert!(missing[0].is_none());
+        let (rows, first_tries) = Rows::open(vec![open]);
+        assert!(first_tries.recv().unwrap().1.is_none());
         let row = Row { name: "Uno".to_owned(), board: Board::Only { beside: None } };
         (rows, Chosen { rows: vec![row], are_several: false })
     }
@@ -342,7 +353,7 @@ mod tests {
             sender.send(Line { number: 1, text: "status".to_owned() }).unwrap();
             drop(sender);
             let mut output = Vec::new();
-            let finding = Talk::new(&rows, &[true], &chosen, None).run(&commands, &mut output).unwrap();
+            let finding = Talk::new(&rows, 0, &chosen, None).run(&commands, &mut output).unwrap();
             ended.send((finding, String::from_utf8(output).unwrap())).unwrap();
         });
         let (finding, output) = end.recv_timeout(Duration::from_secs(30)).expect("it ends");
@@ -377,7 +388,7 @@ mod tests {
             sender.send(Line { number, text: (*text).to_owned() }).unwrap();
         }
         drop(sender);
-        Talk::new(&rows, &[true], &chosen, None).run(&commands, output)
+        Talk::new(&rows, 0, &chosen, None).run(&commands, output)
     }
 
     #[test]
@@ -402,7 +413,7 @@ mod tests {
     #[test]
     fn one_answer_ends_every_hold_before_it() {
         let (rows, chosen) = only_row(opener(&ScriptedBoard::plugged_in()));
-        let mut talk = Talk::new(&rows, &[true], &chosen, None);
+        let mut talk = Talk::new(&rows, 0, &chosen, None);
         for (number, text) in [(1, "hold"), (2, "Hold!")] {
             talk.command(&Line { number, text: text.to_owned() }, &mut Vec::new());
         }
@@ -410,6 +421,41 @@ mod tests {
         let what = What::Happened(Happening::Answered { number: 1, command: "hold".to_owned(), refusal: None });
         talk.take(&Heard { row: 0, at: Instant::now(), what }, false, &mut Vec::new()).unwrap();
         assert!(talk.is_idle());
+    }
+
+    #[test]
+    fn a_hold_reaches_the_rows_that_are_there_while_another_is_not_open_yet() {
+        let (gate, closed) = mpsc::channel::<()>();
+        let absent: Opener = Box::new(move || {
+            // An error too: the gate is open.
+            let _ = closed.recv();
+            Err(LinkError::Absent("it".to_owned()))
+        });
+        let board = ScriptedBoard::plugged_in();
+        let (rows, first_tries) = Rows::open(vec![opener(&board), absent]);
+        assert_eq!(first_tries.recv().unwrap().0, 0);
+        let row = |name: &str| Row { name: name.to_owned(), board: Board::Only { beside: None } };
+        let chosen = Chosen { rows: vec![row("left"), row("s\u{fc}d")], are_several: true };
+        let (sender, commands) = mpsc::sync_channel(2);
+        for (number, text) in [(1, "hold"), (2, "left: clear")] {
+            sender.send(Line { number, text: text.to_owned() }).unwrap();
+        }
+        drop(sender);
+        let talk = thread::spawn(move || {
+            let mut output = Vec::new();
+            let ended = Talk::new(&rows, 0, &chosen, None).run(&commands, &mut output);
+            (ended.unwrap_err().to_string(), String::from_utf8(output).unwrap())
+        });
+        let has_held = (0..30_000).any(|_| {
+            thread::sleep(Duration::from_millis(1));
+            board.typed().contains(&"hold".to_owned())
+        });
+        assert!(has_held && !board.typed().contains(&"clear".to_owned()), "{:?}", board.typed());
+        drop(gate);
+        let (error, output) = talk.join().unwrap();
+        assert_eq!(error, "not all was answered by s\u{fc}d");
+        assert!(output.contains("HOLD 1 of 2 in ") && output.contains("NOT THERE: s\u{fc}d"), "{output}");
+        assert!(board.typed().contains(&"clear".to_owned()), "{:?}", board.typed());
     }
 
     #[test]

@@ -5,7 +5,7 @@ use super::{addressed, view};
 use crate::ctrl_c;
 use crate::record::Logs;
 use anyhow::{Context, Result, ensure};
-use link::rows::{Hold, Rows, What};
+use link::rows::{Hold, Rows};
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{
     self, DisableMouseCapture, EnableMouseCapture, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers,
@@ -59,9 +59,7 @@ fn watch(
     loop {
         let until = Instant::now() + TURN;
         while let Some(heard) = rows.next(until.saturating_duration_since(Instant::now())) {
-            if let (Some(logs), What::Happened(happening)) = (&mut *logs, &heard.what)
-                && let Err(error) = logs.write(heard.row, |log| log.write(log.now_ms(), happening))
-            {
+            if let Some(Err(error)) = logs.as_mut().map(|logs| logs.take(&heard)) {
                 // The machine is still watched, and the other rows' logs are still written.
                 model.say(format!("-- {:#}", anyhow::Error::from(error)));
             }
@@ -149,6 +147,7 @@ mod tests {
     use super::*;
     use crate::monitor::model::Answer;
     use link::connection::Opener;
+    use link::rows::What;
     use link::session::Happening;
     use link::settings::Settings;
     use link::{EventLine, LinkError};

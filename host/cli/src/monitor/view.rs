@@ -124,8 +124,9 @@ fn draw_said(model: &Model, frame: &mut Frame, area: Rect) {
 /// keys.
 fn draw_line(model: &Model, to: &str, frame: &mut Frame, area: Rect, hint: Rect) {
     let prompt = format!("{to}> ");
+    let before = Line::raw(format!("{prompt}{}", &model.line.text[..model.line.cursor]));
     // A line has at most 80 characters.
-    let column = (area.x + (prompt.chars().count() + model.line.cursor) as u16).min(area.right().saturating_sub(1));
+    let column = (area.x + before.width() as u16).min(area.right().saturating_sub(1));
     frame.render_widget(Line::from(vec![prompt.bold(), model.line.text.as_str().into()]), area);
     frame.set_cursor_position(Position::new(column, area.y));
     let candidates = &model.line.candidates;

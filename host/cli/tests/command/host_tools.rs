@@ -105,6 +105,7 @@ fn settings_are_pulled_changed_compared_and_pushed() {
     // A machine that has lost its settings has the factory's.
     let lost = printed(&weeder(&["settings", "pull", name, "--force"], uno.path(), ""), 2);
     assert!(lost.contains("(alarm 5-1)") && lost.contains("machine.toml is not replaced"), "{lost}");
+    assert!(lost.contains("Then `clear` in `weeder monitor` ends the alarm"), "{lost}");
     let same = printed(&weeder(&["settings", "diff", name], uno.path(), ""), 0);
     assert!(same.starts_with("The machine has the settings of "), "{same}");
 
@@ -256,10 +257,10 @@ fn a_virtual_uno_prints_the_next_command() {
     let elf = elf.to_str().expect("it is text");
     let old = "/usr/share/arduino/hardware/arduino/avr/bootloaders/atmega/ATmegaBOOT_168_atmega328.hex";
     for (words, next) in [
-        (&["--link", "my uno", "--elf", elf][..], "weeder monitor --port 'my uno'\n"),
-        (&["--link", "row", "--rows", "2", "--elf", elf], "weeder monitor --port row1 --port row2\n"),
-        (&["--link", "uno", "--bootloader", "optiboot"], "weeder flash --port uno\n"),
-        (&["--link", "uno", "--bootloader", old], "weeder flash --old-bootloader --port uno\n"),
+        (&["--link", "my uno", "--elf", elf][..], "weeder monitor --port './my uno'\n"),
+        (&["--link", "row", "--rows", "2", "--elf", elf], "weeder monitor --port ./row1 --port ./row2\n"),
+        (&["--link", "uno", "--bootloader", "optiboot"], "weeder flash --port ./uno\n"),
+        (&["--link", "uno", "--bootloader", old], "weeder flash --old-bootloader --port ./uno\n"),
     ] {
         let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
         let command = command.current_dir(&folder).args(["virtual-uno", "--stand", "--for", "1"]).args(words);
@@ -267,6 +268,14 @@ fn a_virtual_uno_prints_the_next_command() {
         let told = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(output.status.success() && told.contains(&format!("in another terminal: {next}")), "{words:?}: {told}");
     }
+}
+
+#[test]
+fn each_row_of_a_virtual_uno_has_the_plants_of_standard_input() {
+    let elf = firmware::build().expect("the firmware builds");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
+    let command = command.args(["virtual-uno", "--rows", "2", "--fast", "--for", "1", "--row", "-", "--elf"]).arg(elf);
+    printed(&typed(command, "position_mm,width_mm,kind\n500,150,plant\n"), 0);
 }
 
 #[test]

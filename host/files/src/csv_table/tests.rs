@@ -58,6 +58,8 @@ fn a_wrong_table_is_refused_with_the_line_and_what_would_be_right() {
         ),
         ("place_mm,width_mm\n7,1\n# 5\" pot\n8,\"1\n9,1\n", 4, UNCLOSED),
         ("place_mm,width_mm\n7,1\n\n8,\"1\n9,1\n10,1\n\"11,1", 4, UNCLOSED),
+        ("place_mm,width_mm\n7,1\n8,\"1\n", 3, UNCLOSED),
+        ("place_mm,width_mm\n7,1\n8,\"", 3, UNCLOSED),
         ("\"place_mm,width_mm\n7,1\n", 1, UNCLOSED),
         ("place_mm,\"width_mm\n7,1\n", 1, UNCLOSED),
         ("place_mm,pot\n7,\"two\nlines\"\n8,1\n", 2, UNCLOSED),

@@ -1,11 +1,10 @@
 //! A stretch while it is read: the wheel's statuses, the events and the ground so far.
 
 use super::{Did, Event, EventKind, Ground};
-use crate::receiver::{Fix, WHEEL_GAP_MS};
-use crate::track::STANDING_M;
+use crate::receiver::Fix;
 use control::say::command::Action;
 use link::{Class, EventLine, Mode, Status};
-use logbook::follower::Follower;
+use logbook::follower::{Follower, is_gap};
 use logbook::log::{Entry, Kind};
 use logbook::worked::NEXT_ROW_M;
 use std::ops::Range;
@@ -13,11 +12,6 @@ use std::ops::Range;
 /// Time before and after a stretch in which the machine is assumed to have stood, in ms. A fix in this time belongs to
 /// the stretch's beginning or end.
 const STANDING_MS: f64 = 1000.0;
-
-/// A machine rolls at most this far between two statuses, in metres, and in metres for each second. The clocks of some
-/// computers stand still during their sleep.
-const AWAKE_M: f64 = 1.0;
-const AWAKE_M_S: f64 = 5.0;
 
 /// A status of the wheel.
 #[derive(Clone, Copy)]
@@ -50,9 +44,7 @@ impl Reading {
 
     /// Whether the wheel has rolled between two statuses, and it is not known when.
     fn is_gap(from: &Rolled, to: &Rolled) -> bool {
-        let (time_ms, rolled_m) = (to.time_ms - from.time_ms, (to.m - from.m).abs());
-        let has_slept = rolled_m > AWAKE_M + AWAKE_M_S * time_ms / 1000.0;
-        has_slept || (time_ms > WHEEL_GAP_MS && rolled_m > STANDING_M)
+        is_gap(to.time_ms - from.time_ms, to.m - from.m)
     }
 
     /// The marks of all gaps.

@@ -25,19 +25,21 @@ fn types(heard: &Heard, line: &str) -> bool {
     matches!(&heard.what, What::Happened(Happening::Command(typed)) if typed == line)
 }
 
-fn open(boards: &[ScriptedBoard]) -> (Rows, Vec<Option<LinkError>>) {
+/// Opens the rows, and waits until each was tried. Returns why rows are missing.
+fn open(boards: &[ScriptedBoard]) -> (Rows, Vec<(usize, LinkError)>) {
     let opener = |board: &ScriptedBoard| -> Opener {
         let board = board.clone();
         Box::new(move || Ok(Wire::over(board.open().ok_or(LinkError::Absent("it".to_owned()))?, false)))
     };
-    Rows::open(boards.iter().map(opener).collect())
+    let (rows, first_tries) = Rows::open(boards.iter().map(opener).collect());
+    (rows, first_tries.into_iter().filter_map(|(row, why)| Some((row, why?))).collect())
 }
 
 #[test]
 fn missing_rows_are_reported_and_the_others_work() {
     let boards = [ScriptedBoard::plugged_in(), ScriptedBoard::default(), ScriptedBoard::plugged_in()];
     let (rows, missing) = open(&boards);
-    assert_matches!(&missing[..], [None, Some(why), None] if why.to_string().contains("there is no port it"));
+    assert_matches!(&missing[..], [(1, why)] if why.to_string().contains("there is no port it"));
     rows.command(1, "clear");
     until(&rows, |heard| matches!(&heard.what, What::NotTyped { .. } if heard.row == 1));
     rows.command(2, "hepl");
@@ -49,6 +51,25 @@ fn missing_rows_are_reported_and_the_others_work() {
     until(&rows, |heard| matches!(&heard.what, What::Happened(Happening::Connected { .. }) if heard.row == 1));
     let typed = boards.each_ref().map(ScriptedBoard::typed);
     assert_eq!(typed, [&["events on"][..], &["events on"], &["events on", "hepl"]]);
+}
+
+#[test]
+fn a_row_that_is_not_open_yet_delays_no_other_row_s_hold() {
+    let port = ScriptedBoard::plugged_in();
+    let (gate, closed) = mpsc::channel::<()>();
+    let absent: Opener = Box::new(move || {
+        // An error too: the gate is open.
+        let _ = closed.recv();
+        Err(LinkError::Absent("it".to_owned()))
+    });
+    let there: Opener = Box::new(move || Ok(Wire::over(port.open().expect("it is plugged in"), false)));
+    let (rows, first_tries) = Rows::open(vec![absent, there]);
+    assert_matches!(first_tries.recv(), Ok((1, None)));
+    rows.hold(0);
+    rows.hold(1);
+    until(&rows, |heard| answers(heard, 1, "hold"));
+    drop(gate);
+    assert_matches!(first_tries.recv(), Ok((0, Some(_))));
 }
 
 #[test]

@@ -265,7 +265,10 @@ impl<'a> Stretch<'a> {
 
     /// Whether a swing belongs to a change of state before it.
     pub(super) fn follows_change(&self, place: usize) -> bool {
-        let change = self.happened[..place].iter().rposition(is_change);
+        // A swing between them is the one of the change.
+        let ends =
+            |told: &(&Entry, Happened)| is_change(told) || swing_or_status(told).is_some_and(|(_, is_swing)| is_swing);
+        let change = self.happened[..place].iter().rposition(ends).filter(|&at| is_change(&self.happened[at]));
         change.and_then(|change| self.swing_of_change(change)).is_some_and(|(index, _)| index == place)
     }
 

@@ -20,8 +20,8 @@ pub struct OfLog {
     /// The first line of its first stretch, and the last line of its last one.
     pub lines: (u64, u64),
     /// From start to end of its stretches, in s. A pause counts, if no stretch of another plot lies between, and the log
-    /// was not opened again.
-    pub time_s: f64,
+    /// was not opened again. `None` if the log has a gap there.
+    pub time_s: Option<f64>,
     /// Net distance by the wheel, m. `None` if a part of it is unknown.
     pub distance_m: Option<f64>,
     /// Mean speed while the machine rolled, km/h.
@@ -33,8 +33,8 @@ pub struct OfLog {
     /// Damaged plants in the table, if it has no number of plants.
     #[serde(skip)]
     pub damaged: Option<u32>,
-    /// Swings out of the row.
-    pub swings: u32,
+    /// Swings out of the row. `None` if the log has a gap there.
+    pub swings: Option<u32>,
 }
 
 impl OfLog {
@@ -42,25 +42,30 @@ impl OfLog {
     fn of(record: &PlotRecord, parts: &[&[(u32, &Worked)]]) -> Self {
         let stretches: Vec<&Worked> = parts.iter().copied().flatten().map(|(_, worked)| *worked).collect();
         let (first, last) = (&stretches[0], &stretches[stretches.len() - 1]);
-        let time_ms =
-            |part: &&[(u32, &Worked)]| part[part.len() - 1].1.time_ms.end.saturating_sub(part[0].1.time_ms.start);
+        let time_ms = |part: &&[(u32, &Worked)]| {
+            let (first, last) = (part[0].1, part[part.len() - 1].1);
+            (first.gaps.start == last.gaps.end).then(|| last.time_ms.end.saturating_sub(first.time_ms.start))
+        };
         let distance_m = stretches.iter().map(|worked| worked.distance_mm).sum::<Option<f64>>().map(|mm| mm / 1000.0);
         let rolled_h = stretches.iter().map(|worked| worked.rolled_ms).sum::<u64>() as f64 / 3.6e6;
         Self {
             plot: record.plot,
             lines: (first.lines.start, last.lines.end - 1),
-            time_s: parts.iter().map(time_ms).sum::<u64>() as f64 / 1000.0,
+            time_s: parts.iter().map(time_ms).sum::<Option<u64>>().map(|ms| ms as f64 / 1000.0),
             distance_m,
             speed_km_h: distance_m.filter(|m| rolled_h > 0.0 && *m > 0.0).map(|m| m / 1000.0 / rolled_h),
             planned_km_h: record.speed_km_h,
             plants: stretches.iter().map(|worked| worked.plants).sum(),
             damaged: record.damaged.filter(|_| record.plants.is_none()),
-            swings: stretches.iter().map(|worked| worked.swings).sum(),
+            swings: stretches.iter().map(|worked| worked.gaps.is_empty().then_some(worked.swings)).sum(),
         }
     }
 
-    /// Says that its speed is far from the planned one.
+    /// Says that the log has a gap there, or that its speed is far from the planned one.
     pub fn warning(&self) -> Option<String> {
+        if self.time_s.is_none() {
+            return Some(format!("plot {}: the log has a gap there: fill in the empty cells yourself", self.plot));
+        }
         let speed_km_h = self.speed_km_h?;
         let is_far = (speed_km_h - self.planned_km_h).abs() > OFF_SPEED * self.planned_km_h;
         is_far.then(|| {
@@ -118,7 +123,7 @@ pub fn join(records: &mut [PlotRecord], stretches: &[Worked], plots: &[u32]) -> 
         let m2 = |width_m: f64| of_log.distance_m.map(|m| m * width_m).filter(|m2| *m2 > 0.0);
         // More digits would only seem to be measured.
         record.speed_km_h = of_log.speed_km_h.map_or(record.speed_km_h, |km_h| (km_h * 1000.0).round() / 1000.0);
-        record.time_s = record.time_s.or(Some(of_log.time_s).filter(|time_s| *time_s > 0.0));
+        record.time_s = record.time_s.or(of_log.time_s.filter(|time_s| *time_s > 0.0));
         record.plants = record.plants.or(of_log.plants.filter(|_| of_log.too_few_plants().is_none()));
         record.area_m2 = record.area_m2.or_else(|| m2(record.width_m?));
         joined.push(of_log);
@@ -145,11 +150,11 @@ pub fn of_log_table(joined: &[OfLog]) -> Table {
         vec![
             plot.to_string(),
             format!("{first} to {last}"),
-            fixed(*time_s, 1),
+            optional(*time_s, |s| fixed(s, 1)),
             optional(*distance_m, |m| fixed(m, 2)),
             optional(*speed_km_h, |km_h| fixed(km_h, 2)),
             optional(plants.map(f64::from), short),
-            swings.to_string(),
+            optional(swings.map(f64::from), short),
         ]
     });
     Table { rows: rows.collect(), ..Table::new("What the log has of each plot", header) }
@@ -163,6 +168,7 @@ mod tests {
         Worked {
             lines: start_s..start_s + seconds,
             session: 0,
+            gaps: 0..0,
             time_ms: 1000 * start_s..1000 * (start_s + seconds),
             rolled_ms: 1000 * seconds,
             distance_mm: Some(1000.0 * metres),
@@ -180,7 +186,7 @@ mod tests {
         // The table was sorted by speed.
         let mut records = [PlotRecord { plants: Some(61), ..plot(2, 1.0) }, plot(1, 1.8)];
         let joined = join(&mut records, &[stretch(0, 60, 30.0), stretch(100, 108, 30.0)], &[]).expect("they match");
-        assert_eq!(joined.iter().map(|of| (of.plot, of.swings)).collect::<Vec<_>>(), [(2, 30), (1, 30)]);
+        assert_eq!(joined.iter().map(|of| (of.plot, of.swings)).collect::<Vec<_>>(), [(2, Some(30)), (1, Some(30))]);
         // 30 m in 60 s are 1.8 km/h, and in 108 s are 1.
         let [second, first] = records;
         assert!((first.speed_km_h - 1.8).abs() < 1e-9 && (second.speed_km_h - 1.0).abs() < 1e-9, "{records:?}");
@@ -198,16 +204,16 @@ mod tests {
         assert!(error.ends_with("; stretch 4 from line 200 of the log, 60 s, 30.0 m"), "{error}");
         let joined = join(&mut records, &stretches, &[0, 1, 1, 2]).expect("they match");
         // With the pause between the two parts.
-        assert_eq!((joined[0].time_s, joined[0].distance_m), (70.0, Some(30.0)));
+        assert_eq!((joined[0].time_s, joined[0].distance_m), (Some(70.0), Some(30.0)));
         assert!((records[0].speed_km_h - 1.8).abs() < 1e-9);
         let joined = join(&mut records, &stretches, &[1, 2, 1, 0]).expect("they match");
-        assert_eq!((joined[0].time_s, joined[0].distance_m), (32.0, Some(15.5)), "without the other plot between");
+        assert_eq!((joined[0].time_s, joined[0].distance_m), (Some(32.0), Some(15.5)), "without the other plot");
         let joined = join(&mut records, &stretches, &[1, 0, 1, 2]).expect("they match");
-        assert_eq!((joined[0].time_s, joined[0].distance_m), (80.0, Some(15.5)), "with a run-up between");
+        assert_eq!((joined[0].time_s, joined[0].distance_m), (Some(80.0), Some(15.5)), "with a run-up between");
         // The clock began again, so the pause is unknown.
         let again = [stretch(10, 30, 15.0), Worked { session: 1, ..stretch(60, 40, 20.0) }];
         let joined = join(&mut records, &again, &[1, 1]).expect("they match");
-        assert_eq!((joined[0].time_s, joined[0].distance_m), (70.0, Some(35.0)));
+        assert_eq!((joined[0].time_s, joined[0].distance_m), (Some(70.0), Some(35.0)));
         let error = join(&mut records, &stretches, &[0, 1, 3, 2]).expect_err("there is no plot 3").to_string();
         assert_eq!(error, "plot 3 is not in the table, which has 2 plots");
         let error = join(&mut [plot(1, 1.8), plot(0, 2.5)], &stretches[..2], &[]).expect_err("one has no number");
@@ -215,6 +221,21 @@ mod tests {
             error.to_string().starts_with("replication 1 of 2.5 km/h and 50 cm has no number of its own:"),
             "{error}"
         );
+    }
+
+    #[test]
+    fn a_gap_of_the_log_is_told_and_leaves_the_time_empty_also_between_two_parts() {
+        let lost = Worked { gaps: 0..1, distance_mm: None, plants: None, ..stretch(0, 60, 30.0) };
+        let behind = Worked { gaps: 1..1, ..stretch(50, 30, 15.0) };
+        for (stretches, distance_m, swings) in
+            [(vec![lost], None, None), (vec![stretch(0, 30, 15.0), behind], Some(30.0), Some(30))]
+        {
+            let mut records = [plot(1, 1.8)];
+            let joined = join(&mut records, &stretches, &vec![1; stretches.len()]).expect("they match");
+            let of = &joined[0];
+            assert_eq!((of.time_s, of.distance_m, of.swings, records[0].time_s), (None, distance_m, swings, None));
+            assert!(of.warning().is_some_and(|said| said.starts_with("plot 1: the log has a gap there:")));
+        }
     }
 
     #[test]

@@ -48,7 +48,7 @@ type Column = (&'static str, &'static str, Option<usize>, (f64, f64), fn(&PlotRe
 /// The range of a count.
 const COUNT: (f64, f64) = (0.0, f64::INFINITY);
 
-/// The columns of a table of plots, which carry their units.
+/// The columns of a table of plots, which carry their units. The plots of every simulated field are in the ranges.
 pub(crate) const COLUMNS: [Column; 11] = [
     ("replication", "replication", None, COUNT, |plot| Some(plot.replication.into())),
     ("speed_km_h", "speed, km/h", None, (0.1, 15.0), |plot| Some(plot.speed_km_h)),
@@ -57,8 +57,8 @@ pub(crate) const COLUMNS: [Column; 11] = [
     ("weeds_after", "weeds after", None, COUNT, |plot| plot.weeds_after.map(f64::from)),
     ("plants", "plants", None, COUNT, |plot| plot.plants.map(f64::from)),
     ("damaged", "damaged", None, COUNT, |plot| plot.damaged.map(f64::from)),
-    ("area_m2", "area, m²", Some(2), (0.01, 1e6), |plot| plot.area_m2),
-    ("time_s", "time, s", Some(1), (0.1, 1e6), |plot| plot.time_s),
+    ("area_m2", "area, m²", Some(2), (0.01, 1e7), |plot| plot.area_m2),
+    ("time_s", "time, s", Some(1), (0.1, 1e9), |plot| plot.time_s),
     ("width_m", "width, m", Some(2), (0.01, 50.0), |plot| plot.width_m),
     ("power_hp", "power, hp", Some(2), (0.001, 1000.0), |plot| plot.power_hp),
 ];

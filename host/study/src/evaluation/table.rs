@@ -113,8 +113,8 @@ mod tests {
             ("speed_km_h", "0.05", "it has to be from 0.1 to 15 km/h"),
             ("spacing_cm", "0.5", "it has to be from 5 to 500 cm"),
             ("damaged", "51", "it cannot exceed plants"),
-            ("area_m2", "0", "it has to be from 0.01 to 1000000 m2"),
-            ("time_s", "0", "it has to be from 0.1 to 1000000 s"),
+            ("area_m2", "0", "it has to be from 0.01 to 10000000 m2"),
+            ("time_s", "0", "it has to be from 0.1 to 1000000000 s"),
             ("width_m", "0", "it has to be from 0.01 to 50 m"),
             ("power_hp", "-1", "it has to be from 0.001 to 1000 hp"),
         ] {

@@ -1,6 +1,8 @@
 //! Tests of the evaluation: the equations, impossible values, and means of treatments.
 
 use super::*;
+use crate::sweep::SPEEDS_KM_H;
+use field::conditions::PARAMETERS;
 
 /// A plot whose measures are round numbers.
 pub const PLOT: PlotRecord = PlotRecord {
@@ -41,8 +43,21 @@ fn a_plot_that_cannot_be_is_named_with_its_place_and_column() {
         Analysis::of(vec![PLOT, plot]).err().map(|error| error.to_string()).unwrap_or_default()
     };
     assert_eq!(wrong(|plot| plot.damaged = Some(51)), "plot 2: damaged is 51: it cannot exceed plants");
-    assert_eq!(wrong(|plot| plot.time_s = Some(f64::NAN)), "plot 2: time_s is NaN: it has to be from 0.1 to 1000000 s");
+    let nan = "plot 2: time_s is NaN: it has to be from 0.1 to 1000000000 s";
+    assert_eq!(wrong(|plot| plot.time_s = Some(f64::NAN)), nan);
     assert_eq!(Analysis::of(Vec::new()).unwrap_err().to_string(), "a trial has at least one plot");
+}
+
+#[test]
+fn the_largest_and_slowest_simulated_plot_is_in_the_ranges() {
+    let greatest = |name: &str| PARAMETERS.iter().find(|parameter| parameter.name == name).unwrap().greatest;
+    let (rows, row_m) = (greatest("plot.rows"), greatest("plot.row_m"));
+    let slowest_m_s = SPEEDS_KM_H.0 / 3.6 * (1.0 - greatest("driving.speed_scatter_percent") / 100.0);
+    let turns_s = rows * (greatest("driving.turn_m") / slowest_m_s + greatest("driving.turn_s"));
+    let stops_s = rows * row_m / 100.0 * greatest("driving.stops_per_100_m") * greatest("driving.stop_s");
+    let area_m2 = Some(rows * row_m * greatest("plot.row_spacing_mm") / 1000.0);
+    let time_s = Some(rows * row_m / slowest_m_s + turns_s + stops_s);
+    PlotRecord { area_m2, time_s, ..PLOT }.check().unwrap();
 }
 
 #[test]
