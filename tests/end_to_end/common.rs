@@ -7,7 +7,7 @@ use field::motion::Motion;
 use field::pass::{Pass, Start};
 use field::row::{Canopy, Row};
 use field::servo::Command;
-use field::verdict::{Judgement, PlantOutcome, Timing, Verdict, judge};
+use field::verdict::{Judgement, PlantOutcome, Verdict, ZoneSettings, judge};
 use field::wiring;
 use std::ops::Range;
 use std::path::PathBuf;
@@ -109,7 +109,7 @@ pub fn pass(row: Row, motion: Motion) -> Pass {
         row,
         machine: Machine::default(),
         motion,
-        timing: Timing::default(),
+        timing: ZoneSettings::default(),
         start: Start::Command,
         settings: Vec::new(),
         examples: Vec::new(),
@@ -163,8 +163,8 @@ pub fn assert_position_exact(outcome: &Outcome) {
 pub fn exchange(uno: &mut Uno, bytes: &[u8]) -> Vec<String> {
     uno.received();
     uno.send(bytes);
-    // A byte takes 0.087 ms; the longest answers take less than 100 ms.
-    run_for_ms(uno, bytes.len() as u64 / 10 + 200);
+    // A byte takes 0.087 ms, and the slowest command, `save`, less than 200 ms.
+    run_for_ms(uno, bytes.len() as u64 / 10 + 300);
     uno.received().lines().map(str::to_owned).collect()
 }
 

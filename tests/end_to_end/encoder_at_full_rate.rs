@@ -4,7 +4,7 @@ use crate::common::{ask, elf, encoder_steps, number, run_for_ms, started, status
 use field::wiring;
 use std::path::Path;
 use uno::{CYCLES_PER_SECOND, PinChange};
-use uno_run::bench::encoder::{self, Counted, Direction, JITTER, Load, Turning};
+use uno_run::bench::encoder::{self, Direction, JITTER, Load, RateResult, Turning};
 
 /// Counts a second that the firmware follows while its status streams at 115200 baud and the beam flickers. This holds
 /// for any timing of the edges: even, and early and late by 30 % of the time between two.
@@ -27,7 +27,7 @@ fn assert_no_count_is_lost(counts_per_s: f64, jitter: f64) {
     }
 }
 
-type Trial = fn(&Path, Turning, f64) -> anyhow::Result<Counted>;
+type Trial = fn(&Path, Turning, f64) -> anyhow::Result<RateResult>;
 
 #[test]
 fn no_count_is_lost_at_the_full_rate_beside_telemetry_and_a_flickering_beam() {

@@ -1,7 +1,7 @@
 //! The paper's experiment with the real firmware on the virtual Uno.
 
 use field::conditions::Conditions;
-use study::experiment::{Engine, Experiment, Treatment};
+use study::experiment::{ControllerKind, Engine, Experiment};
 use uno_run::firmware;
 
 /// Over all plots, in-row weeding may fall short of the servo's bound by this share of the ground. A single plot may
@@ -17,7 +17,7 @@ fn the_firmware_damages_no_plant_at_any_of_the_papers_speeds_and_spacings_and_we
     conditions.set("lead_out_ms", 180.0).unwrap();
     let experiment = Experiment {
         replications: 1,
-        controllers: vec![Treatment::Firmware],
+        controllers: vec![ControllerKind::Firmware],
         ..Experiment::as_in_the_paper(conditions, 2)
     };
     let outcomes = experiment.run(&Engine::Uno(firmware::build().unwrap()), |_| ()).unwrap();

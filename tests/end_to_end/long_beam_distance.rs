@@ -5,14 +5,14 @@ use field::machine::Machine;
 use field::motion::mm_s;
 use field::pass::Pass;
 use field::planting::Planting;
-use field::verdict::Timing;
+use field::verdict::ZoneSettings;
 
 /// Rolls along plants every 500 mm, and asks for the status meanwhile.
 fn run_with_beam_at(beam_to_tool_mm: f64, speed_km_h: f64) -> Run {
     let planting = Planting { plants: 8, spacing_scatter_mm: 20.0, ..Planting::default() };
     let row = planting.grow(1).expect("the plants have room");
     let machine = Machine { beam_to_tool_mm, ..Machine::default() };
-    let mut run = Run::begin(Pass::at_speed(row, machine, Timing::default(), mm_s(speed_km_h)), &[]);
+    let mut run = Run::begin(Pass::at_speed(row, machine, ZoneSettings::default(), mm_s(speed_km_h)), &[]);
     run.roll_on_asking("status", 100);
     run.roll_to_the_end();
     run

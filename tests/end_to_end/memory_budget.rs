@@ -5,7 +5,7 @@ use field::machine::Machine;
 use field::motion::mm_s;
 use field::pass::Pass;
 use field::planting::Planting;
-use field::verdict::Timing;
+use field::verdict::ZoneSettings;
 use std::fs;
 use std::process::Command;
 use uno::elf::{Image, Size};
@@ -21,7 +21,7 @@ const STACK_BYTES: usize = 768;
 #[test]
 fn the_stack_stays_within_its_reserve() {
     let row = Planting { plants: 4, weeds: 2, ..Planting::default() }.grow(1).expect("everything has room");
-    let mut run = Run::begin(Pass::at_speed(row, Machine::default(), Timing::default(), mm_s(2.5)), &[]);
+    let mut run = Run::begin(Pass::at_speed(row, Machine::default(), ZoneSettings::default(), mm_s(2.5)), &[]);
     run.roll_to_the_end();
     for command in
         ["status", "help", "help k", "get", "dump", "label plant", "examples", "hold", "forget all", "set k 5"]
@@ -36,6 +36,8 @@ fn the_stack_stays_within_its_reserve() {
 #[test]
 fn the_firmware_stays_within_its_memory_budget() {
     let Size { flash, sram } = Size::read(&elf()).expect("the ELF can be read");
+    let gate = fs::read_to_string(workspace_root().join(".ci/run")).expect("it is text");
+    assert!(gate.contains(&format!("flash_budget={FLASH_BYTES} sram_budget={SRAM_BYTES}")), "see .ci/run");
     println!("flash {flash} of {FLASH_BYTES} bytes, static SRAM {sram} of {SRAM_BYTES} bytes");
     assert!(flash <= FLASH_BYTES, "{flash} bytes of flash");
     assert!(sram <= SRAM_BYTES, "{sram} bytes of static SRAM");

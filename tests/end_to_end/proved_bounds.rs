@@ -10,14 +10,14 @@ use control::ground::detection::Detection;
 use control::ground::{examples, features, field_examples, keep_out};
 use control::operate::event::{self, Event};
 use control::operate::{dry_run, saved};
-use control::say::command::{Argument, LINE_LENGTH, Word};
+use control::say::command::{Argument, LINE_LENGTH, ROWS, Word};
 use control::say::{line, packed};
 use control::settings::Setting;
 use field::machine::Machine;
 use field::motion::mm_s;
 use field::pass::Pass;
 use field::planting::Planting;
-use field::verdict::Timing;
+use field::verdict::ZoneSettings;
 use knn::MAX_K;
 use model_test::{cases, is_thorough};
 use rayon::prelude::*;
@@ -130,7 +130,7 @@ fn weeding_and_every_command_stay_within_the_bounds() {
     let bounds = proved();
     let row =
         Planting { plants: 4, weeds: 2, ragged: true, ..Planting::default() }.grow(1).expect("everything has room");
-    let pass = Pass::at_speed(row, Machine::default(), Timing::default(), mm_s(2.5));
+    let pass = Pass::at_speed(row, Machine::default(), ZoneSettings::default(), mm_s(2.5));
     let mut run = Run::begin(pass, &[]);
     run.uno.measure_interrupts();
     run.uno.measure_turns();
@@ -198,6 +198,7 @@ fn loops_are_said_to_turn_as_often_as_the_constants_behind_them_have_it() {
     let longest = words.iter().flatten().map(|word| word.bytes().count()).max().expect("there are words");
     assert_eq!(by_depth("control::say::packed::Text::find"), [most + 1, longest + 1]);
     assert_eq!(passes("control::say::packed::Text::start"), packed::LARGEST_GROUP);
+    assert_eq!(passes("control::say::command::parse_to"), ROWS.len() + 1);
     assert_eq!(passes("control::say::packed::Characters::next"), packed::HALVINGS + 1);
     // Twice, and once more to find that there is no third time.
     assert_eq!(by_depth("control::ground::Ground::widen"), [3, keep_out::CAPACITY + 1]);

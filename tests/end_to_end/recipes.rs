@@ -74,10 +74,11 @@ fn a_setting_a_command_an_alarm_and_an_event_are_added_as_contributing_says() {
         fs::write(&path, [head, before, lines, tail].concat()).expect("it can be written");
     }
 
-    // The build of the libraries is shared, the ELF is not.
+    // A build folder of its own: in a shared one, cargo takes this firmware for that of the sources afterwards. It stays for the
+    // next time.
     let mut cargo = Command::new("cargo");
     cargo.args(["firmware", "--quiet", "--target-dir"]).arg(folder.join("target")).current_dir(&copied);
-    cargo.env("CARGO_BUILD_BUILD_DIR", folder.parent().expect("it is in the target folder"));
+    cargo.env("CARGO_BUILD_BUILD_DIR", folder.with_file_name("recipes-build"));
     for name in ["RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS", "CARGO_TARGET_DIR", "RUSTC_WORKSPACE_WRAPPER", "WEEDER_COMMIT"]
     {
         cargo.env_remove(name);

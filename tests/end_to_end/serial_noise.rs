@@ -6,7 +6,7 @@ use field::machine::Machine;
 use field::motion::mm_s;
 use field::pass::Pass;
 use field::planting::Planting;
-use field::verdict::Timing;
+use field::verdict::ZoneSettings;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -17,7 +17,7 @@ const GRAIN_MM: f64 = SPEED_KM_H / 3.6 * 6.0;
 
 fn set_out() -> Run {
     let row = Planting { plants: 4, ..Planting::default() }.grow(1).expect("the plants have room");
-    Run::begin(Pass::at_speed(row, Machine::default(), Timing::default(), mm_s(SPEED_KM_H)), &["events off"])
+    Run::begin(Pass::at_speed(row, Machine::default(), ZoneSettings::default(), mm_s(SPEED_KM_H)), &["events off"])
 }
 
 /// The commands at the pin: out or in, and the position.

@@ -6,11 +6,11 @@ use field::motion::mm_s;
 use field::pass::Pass;
 use field::planting::Planting;
 use field::row::{Canopy, Row};
-use field::verdict::Timing;
+use field::verdict::ZoneSettings;
 
 fn roll_along(planting: Planting, seed: u64, speed_km_h: f64) -> Run {
     let row = planting.grow(seed).expect("everything has room");
-    let mut run = Run::begin(Pass::at_speed(row, Machine::default(), Timing::default(), mm_s(speed_km_h)), &[]);
+    let mut run = Run::begin(Pass::at_speed(row, Machine::default(), ZoneSettings::default(), mm_s(speed_km_h)), &[]);
     run.roll_to_the_end();
     run
 }
@@ -35,7 +35,7 @@ fn what_is_narrower_than_the_least_width_is_dust_that_is_counted_and_no_object()
     let dust = (0..8).map(|number| Canopy::weed(450.0 + 40.0 * f64::from(number), 4.0));
     let row = Row::new(dust.chain([Canopy::plant(300.0, 150.0), Canopy::weed(800.0, 18.0)]).collect());
     let row = row.expect("all of them stand apart");
-    let pass = Pass::at_speed(row, Machine::default(), Timing::default(), mm_s(2.0));
+    let pass = Pass::at_speed(row, Machine::default(), ZoneSettings::default(), mm_s(2.0));
     let mut run = Run::begin(pass, &["set min_width_mm 8"]);
     run.roll_to_the_end();
     assert_all_kept(&run.judgement());

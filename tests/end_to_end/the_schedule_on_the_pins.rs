@@ -5,7 +5,7 @@ use field::machine::Machine;
 use field::motion::mm_s;
 use field::pass::Pass;
 use field::planting::Planting;
-use field::verdict::Timing;
+use field::verdict::ZoneSettings;
 
 /// Beam edges and counter each have a grain of a tick.
 const GRAIN_TICKS: f64 = 2.0;
@@ -19,7 +19,7 @@ fn assert_near(line: &str, key: &str, true_ticks: f64) {
 #[track_caller]
 fn assert_schedules_as_the_equations_say(machine: Machine) {
     let row = Planting { plants: 5, ..Planting::default() }.grow(3).expect("the plants have room");
-    let pass = Pass::at_speed(row.clone(), machine, Timing::default(), mm_s(2.0));
+    let pass = Pass::at_speed(row.clone(), machine, ZoneSettings::default(), mm_s(2.0));
     let start_mm = pass.motion.start_mm();
     let mut run = Run::begin(pass, &[]);
     run.roll_to_the_end();

@@ -9,7 +9,7 @@ use field::machine::Machine;
 use field::motion::mm_s;
 use field::pass::Start;
 use field::row::{Canopy, Row};
-use field::verdict::Timing;
+use field::verdict::ZoneSettings;
 use field::wiring;
 use uno::Uno;
 use uno::{CYCLES_PER_SECOND, PinChange};
@@ -61,7 +61,7 @@ fn the_servo_has_its_signal_from_the_first_frame_on() {
 
 #[test]
 fn the_tool_enters_the_row_a_margin_behind_the_start_of_the_seen_ground() {
-    let Timing { margin_mm, lead_in_ms, .. } = Timing::default();
+    let ZoneSettings { margin_mm, lead_in_ms, .. } = ZoneSettings::default();
     for start in [Start::Command, Start::Switch] {
         let (machine, speed_mm_s) = (Machine::default(), mm_s(2.0));
         let mut run = Run::begin(field::pass::Pass { start, ..pass(bare_ground(), steady(speed_mm_s, 700.0)) }, &[]);

@@ -5,7 +5,7 @@ use field::machine::Machine;
 use field::motion::mm_s;
 use field::pass::Pass;
 use field::planting::Planting;
-use field::verdict::Timing;
+use field::verdict::ZoneSettings;
 use model_test::cases;
 
 /// Rows of 8 plants, 480 to 620 mm apart, with canopies of 100 to 180 mm.
@@ -24,7 +24,7 @@ fn assert_weeds_at(speed_km_h: f64) {
     let machine = Machine::default();
     for seed in 1..=cases(4) {
         let row = PLANTING.grow(seed).expect("the plants have room");
-        let outcome = outcome(&Pass::at_speed(row, machine, Timing::default(), mm_s(speed_km_h)));
+        let outcome = outcome(&Pass::at_speed(row, machine, ZoneSettings::default(), mm_s(speed_km_h)));
         assert_all_kept(&outcome.judgement);
         assert_a_swing_each(&outcome.judgement, &machine.servo.commands(&outcome.pulses));
         assert_commands_in_place(&outcome.judgement);

@@ -9,7 +9,7 @@ use crate::settings::Setting;
 use core::mem;
 use heapless::Vec;
 
-pub use super::words::{Action, Argument, Word, Wrong};
+pub use super::words::{Action, Argument, ROWS, Word, Wrong};
 
 /// Most characters of a line.
 pub const LINE_LENGTH: usize = 80;

@@ -32,7 +32,8 @@ macro_rules! commands {
             }
         }
 
-        const ROWS: &[[u8; 2]] = &[$($([Word::$Word as u8, $follows],)*)*];
+        /// The rows of the grammar: a word, and what follows it.
+        pub const ROWS: &[[u8; 2]] = &[$($([Word::$Word as u8, $follows],)*)*];
     };
 }
 

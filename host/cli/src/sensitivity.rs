@@ -10,7 +10,7 @@ use frame::{number_within, say, source, whole_within, with_bar};
 use link::settings::Setting;
 use std::collections::HashSet;
 use std::str::FromStr;
-use study::experiment::{Engine, Experiment, Treatment, totals};
+use study::experiment::{ControllerKind, Engine, Experiment, totals};
 use study::statistics::Share;
 use study::sweep::{SPACINGS_CM, SPEEDS_KM_H};
 use study::table::{distinct, optional, visible};
@@ -118,7 +118,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         speeds_km_h: speeds.clone(),
         spacings_cm: vec![*spacing],
         replications: *replications,
-        controllers: vec![Treatment::Firmware],
+        controllers: vec![ControllerKind::Firmware],
         ..Experiment::as_in_the_paper(conditions.clone(), *seed)
     };
     let changes: Vec<Change> = [Change::default()].into_iter().chain(changes.iter().cloned()).collect();

@@ -15,7 +15,7 @@ use link::settings::{self, Setting};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 use std::sync::LazyLock;
-use study::experiment::{PlotOutcome, Treatment};
+use study::experiment::{ControllerKind, PlotOutcome};
 use study::shard::Shard;
 use study::sweep::{Axis, Point, RESULTS, SPACINGS_CM, SPEEDS_KM_H, Sweep};
 use study::table::{in_two_lines, optional, visible};
@@ -70,14 +70,14 @@ fn axis() -> impl TypedValueParser<Value = Axis> {
     offering(|| NAMES.iter().map(String::as_str).collect(), |text: &str| text.parse::<Axis>())
 }
 
-fn controller() -> impl TypedValueParser<Value = Treatment> {
+fn controller() -> impl TypedValueParser<Value = ControllerKind> {
     let ideal = PossibleValue::new("ideal").alias("all-knowing");
     let names = ["firmware", "without-look-ahead", "paper"].map(PossibleValue::new);
     PossibleValuesParser::new(names.into_iter().chain([ideal])).map(|name| match name.as_str() {
-        "firmware" => Treatment::Firmware,
-        "without-look-ahead" => Treatment::WithoutLookAhead,
-        "paper" => Treatment::Paper,
-        _ => Treatment::Ideal,
+        "firmware" => ControllerKind::Firmware,
+        "without-look-ahead" => ControllerKind::WithoutLookAhead,
+        "paper" => ControllerKind::Paper,
+        _ => ControllerKind::Ideal,
     })
 }
 
@@ -95,7 +95,7 @@ pub struct Arguments {
     result: String,
     /// The controller: the firmware, the firmware without leads, the paper's, or the ideal controller.
     #[arg(long, value_parser = controller(), default_value = "firmware")]
-    controller: Treatment,
+    controller: ControllerKind,
     /// The field: a preset or a TOML file, as for `weeder trial`.
     #[arg(long, value_name = "PRESET|FILE.toml", value_parser = source::preset_or_file(), hide_possible_values = true, default_value = conditions::DEFAULT)]
     field: String,

@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Instant;
 use study::evaluation::Analysis;
-use study::experiment::{self, Engine, Experiment, PlotOutcome, Total, Treatment};
+use study::experiment::{self, ControllerKind, Engine, Experiment, PlotOutcome, Total};
 use study::page::Page;
 use study::shard::{Numbered, Shard};
 use study::sweep::{SPACINGS_CM, SPEEDS_KM_H};
@@ -124,11 +124,11 @@ enum Baseline {
 
 impl Arguments {
     /// The firmware and its baselines, in the order in which they are shown.
-    fn controllers(&self) -> Vec<Treatment> {
+    fn controllers(&self) -> Vec<ControllerKind> {
         let baselines = [Baseline::Queue, Baseline::Paper, Baseline::Ideal].into_iter();
-        let all = baselines.zip([Treatment::WithoutLookAhead, Treatment::Paper, Treatment::Ideal]);
+        let all = baselines.zip([ControllerKind::WithoutLookAhead, ControllerKind::Paper, ControllerKind::Ideal]);
         let asked = all.filter(|(name, _)| self.baselines.contains(name)).map(|(_, controller)| controller);
-        [Treatment::Firmware].into_iter().chain(asked).collect()
+        [ControllerKind::Firmware].into_iter().chain(asked).collect()
     }
 
     /// The command that gives the same result: its options that differ from the defaults, in a fixed order.
@@ -284,11 +284,11 @@ fn show(
         let (budget, about, summary) = (loss_budget(&totals), about(study), summary.join("\n"));
         say!("{plants}\n{ground}\n\n{LOSS_BUDGET}\n{budget}\n{about}\n\n{summary}")
     };
-    let alarms: u32 = of(&totals, Treatment::Firmware).map(|total| total.plots.alarms).sum();
-    let damaged: u32 = of(&totals, Treatment::Firmware).map(|total| total.plots.effect.injured_of_seen().0).sum();
+    let alarms: u32 = of(&totals, ControllerKind::Firmware).map(|total| total.plots.alarms).sum();
+    let damaged: u32 = of(&totals, ControllerKind::Firmware).map(|total| total.plots.effect.injured_of_seen().0).sum();
     if let Some(folder) = folder {
         // It may take much longer than the trial.
-        let analysis = Analysis::of(experiment::records(outcomes, Treatment::Firmware))?;
+        let analysis = Analysis::of(experiment::records(outcomes, ControllerKind::Firmware))?;
         write_report(folder, study, picture()?, outcomes, &totals, &analysis, summary)?;
         if !json {
             say!("\nWritten: report.html, trial.csv and controllers.csv in {}", folder.path().display())?;
@@ -299,7 +299,7 @@ fn show(
 }
 
 /// The totals of one controller, by speed.
-fn of(totals: &[Total], controller: Treatment) -> impl Iterator<Item = &Total> {
+fn of(totals: &[Total], controller: ControllerKind) -> impl Iterator<Item = &Total> {
     totals.iter().filter(move |total| total.plots.controller == controller)
 }
 
@@ -343,7 +343,7 @@ fn write_report(
     let html = page.html()?;
     let [report, plots, controllers] = REPORT;
     folder.write(report, |to| Ok(to.write_all(html.as_bytes())?))?;
-    folder.write(plots, |to| Ok(experiment::write_csv(outcomes, &[Treatment::Firmware], to)?))?;
+    folder.write(plots, |to| Ok(experiment::write_csv(outcomes, &[ControllerKind::Firmware], to)?))?;
     folder.write(controllers, |to| Ok(experiment::write_csv(outcomes, &experiment.controllers, to)?))
 }
 

@@ -137,14 +137,14 @@ mod tests {
     use crate::machine::Machine;
     use crate::motion::mm_s;
     use crate::row::{Canopy, Row};
-    use crate::verdict::{Timing, judge};
+    use crate::verdict::{ZoneSettings, judge};
 
     const PLACES: [f64; 8] = [500.0, 1000.0, 1500.0, 2000.0, 2500.0, 3000.0, 3500.0, 4000.0];
 
     /// Plants over whose canopy the tool was not fully out.
     fn reached_by(controller: impl Fn(&Pass) -> Weeded, speed_km_h: f64) -> usize {
         let row = Row::new(PLACES.map(|place_mm| Canopy::plant(place_mm, 150.0)).to_vec()).unwrap();
-        let pass = Pass::at_speed(row, Machine::default(), Timing::default(), mm_s(speed_km_h));
+        let pass = Pass::at_speed(row, Machine::default(), ZoneSettings::default(), mm_s(speed_km_h));
         let Weeded { pulses, .. } = controller(&pass);
         let judgement = judge(&pass.row, &pass.machine, &pass.motion, pass.timing, &pulses, 0);
         assert!(judgement.weeded_share > 0.1);

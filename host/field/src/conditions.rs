@@ -12,7 +12,9 @@ mod parameters;
 use control::settings::{SECOND_BEAM_LEAST_MM, SLIPPING_BEAM_TO_TOOL_MM, Setting};
 use files::toml_entry::{self, Entry};
 use files::{FileError, bounded_file, near};
-pub use parameters::{Arm, Conditions, Crop, Driving, Ground, Mechanism, PARAMETERS, Parameter, Plot, Sensors, Weeds};
+pub use parameters::{
+    Arm, Conditions, Crop, Driving, GroundConditions, Mechanism, PARAMETERS, Parameter, Plot, Sensors, Weeds,
+};
 use std::fmt::Display;
 use std::io::ErrorKind;
 use std::ops::Range;

@@ -32,7 +32,7 @@ const STOP_SCATTER: f64 = 0.5;
 
 /// A row, driven.
 #[derive(Clone, Debug)]
-pub struct Drive {
+pub struct DrivenRow {
     /// The machine's motion: its position is the ground below the beam.
     pub motion: Motion,
     /// How long the tool takes for the row, stops included.
@@ -44,7 +44,7 @@ pub struct Drive {
 }
 
 /// The drive along a row at a mean speed.
-pub fn drive(conditions: &Conditions, span_mm: &Range<f64>, speed_km_h: f64, rng: &mut impl Rng) -> Drive {
+pub fn drive(conditions: &Conditions, span_mm: &Range<f64>, speed_km_h: f64, rng: &mut impl Rng) -> DrivenRow {
     let Conditions { ground, driving, machine, .. } = conditions;
     let wander = |rng: &mut _| mm_s(speed_km_h) * (1.0 + scatter(rng, driving.speed_scatter_percent / 100.0));
     let fastest_mm_s = mm_s(speed_km_h) * (1.0 + driving.speed_scatter_percent / 100.0);
@@ -83,7 +83,7 @@ pub fn drive(conditions: &Conditions, span_mm: &Range<f64>, speed_km_h: f64, rng
     let turn_s = driving.turn_m * 1000.0 / mm_s(speed_km_h) + driving.turn_s * (1.0 + scatter(rng, STOP_SCATTER));
     let strays_mm = span_mm.start - RUN_OUT_MM..end_mm;
     let steering = Steering::within(driving.steering_mm, machine.side_play_mm, strays_mm, rng);
-    Drive { motion, row_s, turn_s, steering }
+    DrivenRow { motion, row_s, turn_s, steering }
 }
 
 /// The machine's position across the row, at each position along it, and its tool's.
@@ -155,7 +155,7 @@ mod tests {
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
-    fn driven(conditions: &Conditions, speed_km_h: f64) -> Drive {
+    fn driven(conditions: &Conditions, speed_km_h: f64) -> DrivenRow {
         drive(conditions, &(0.0..20_000.0), speed_km_h, &mut ChaCha8Rng::seed_from_u64(5))
     }
 

@@ -10,7 +10,7 @@ use crate::machine::{Dirt, Machine};
 use crate::motion::{Motion, run_up_mm};
 use crate::row::{Row, Stem};
 use crate::servo::{Scatter, Servo};
-use crate::verdict::Timing;
+use crate::verdict::ZoneSettings;
 use control::ground::features;
 use control::settings::Setting;
 use knn::Example;
@@ -37,7 +37,7 @@ pub struct Pass {
     /// How it rolls.
     pub motion: Motion,
     /// The firmware's margin and leads.
-    pub timing: Timing,
+    pub timing: ZoneSettings,
     /// How the firmware is put to work.
     pub start: Start,
     /// Further settings. Those of the machine replace its own, and the others follow machine and timing.
@@ -77,7 +77,7 @@ const SLOWEST_TOP_SPEED_MM_S: f64 = 100.0;
 
 impl Pass {
     /// A pass of the whole row at one speed, from a standstill ahead of it until the tool has passed its end.
-    pub fn at_speed(row: Row, machine: Machine, timing: Timing, speed_mm_s: f64) -> Self {
+    pub fn at_speed(row: Row, machine: Machine, timing: ZoneSettings, speed_mm_s: f64) -> Self {
         let span = row.span_mm();
         let motion = Motion::steady(
             span.start - run_up_mm(speed_mm_s, ACCELERATION_MM_S2),
@@ -113,7 +113,7 @@ impl Pass {
     /// machine, and the top speed comes last.
     pub fn firmware_settings(&self) -> Vec<(Setting, u16)> {
         let Machine { wheel_mm, ticks_per_rev, beam_to_tool_mm, second_beam_mm, servo, .. } = self.machine;
-        let Timing { margin_mm, lead_out_ms, lead_in_ms, .. } = self.timing;
+        let ZoneSettings { margin_mm, lead_out_ms, lead_in_ms, .. } = self.timing;
         let of = |setting: Setting, machine: f64| (setting, self.own(setting).unwrap_or(machine.round() as u16));
         let beam_to_tool = of(Setting::BeamToToolMm, beam_to_tool_mm);
         let notice_mm = f64::from(beam_to_tool.1) - f64::from(margin_mm) - 2.0;
@@ -172,9 +172,9 @@ impl Conditions {
     }
 
     /// The firmware's margin, leads and stem zone.
-    pub fn timing(&self) -> Timing {
+    pub fn timing(&self) -> ZoneSettings {
         let of = |setting: Setting| self.setting_or(setting, setting.default().into()) as u32;
-        Timing {
+        ZoneSettings {
             margin_mm: of(Setting::MarginMm),
             lead_out_ms: of(Setting::LeadOutMs),
             lead_in_ms: of(Setting::LeadInMs),
@@ -342,7 +342,10 @@ mod tests {
     #[test]
     fn margin_and_leads_are_set_once_as_the_timing() {
         let conditions = Conditions::with("transplanted", &[("lead_out_ms", 200.0), ("margin_mm", 40.0)]);
-        assert_eq!(conditions.timing(), Timing { lead_out_ms: 200, margin_mm: 40, ..Conditions::default().timing() });
+        assert_eq!(
+            conditions.timing(),
+            ZoneSettings { lead_out_ms: 200, margin_mm: 40, ..Conditions::default().timing() }
+        );
         assert!(conditions.firmware_settings().is_empty());
     }
 }

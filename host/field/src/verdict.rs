@@ -11,13 +11,13 @@
 //! only at the beam's height.
 //!
 //! A swing is also compared with its ideal position. The ideal follows from the true ends of the canopy, the margin,
-//! the leads of the [`Timing`] and the true speed at that moment. Plants that share one swing share its two commands:
+//! the leads of the [`ZoneSettings`] and the true speed at that moment. Plants that share one swing share its two commands:
 //! the first plant has the command out, the last one has the command back.
 
 mod swing;
 mod timing;
 
-pub use self::timing::Timing;
+pub use self::timing::ZoneSettings;
 
 use self::swing::Swing;
 use self::timing::Level;
@@ -137,7 +137,7 @@ impl Judgement {
 /// travelled while the tool swings and does not work the row's line. `T` is the servo's travel. Its dead time costs
 /// nothing with the right leads. At the ends of a stem zone's circle, the tool may still swing. The inter-row tools are
 /// not part of this figure.
-pub fn weedable_share(row: &Row, machine: &Machine, motion: &Motion, timing: Timing) -> f64 {
+pub fn weedable_share(row: &Row, machine: &Machine, motion: &Motion, timing: ZoneSettings) -> f64 {
     let degrees_a_s = OUT_DEGREES / (machine.servo.travel_ms / 1000.0);
     let levels: Vec<(Level, f64)> = timing
         .outline()
@@ -165,7 +165,7 @@ pub fn judge(
     row: &Row,
     machine: &Machine,
     motion: &Motion,
-    timing: Timing,
+    timing: ZoneSettings,
     pulses: &[Pulse],
     start_cycle: u64,
 ) -> Judgement {
@@ -256,7 +256,7 @@ fn plant_outcome(
     closed: &[Range<f64>],
     over_zone: &[(Level, Vec<Range<f64>>)],
     machine: &Machine,
-    timing: Timing,
+    timing: ZoneSettings,
 ) -> PlantOutcome {
     let kept = timing.kept_mm(plant);
     let (clear_mm, back_mm) = swings_beside(closed, &kept, plant.position_mm);
@@ -368,7 +368,7 @@ mod tests {
     }
 
     /// Positions of the machine at which the swings of [`row`] should be commanded, with these leads.
-    fn ideal_mm(timing: Timing) -> Vec<f64> {
+    fn ideal_mm(timing: ZoneSettings) -> Vec<f64> {
         let lead_mm = |lead_ms: u32| mm_s(2.5) * f64::from(lead_ms) / 1000.0;
         let mut places = vec![200.0];
         for plant in row().plants() {
@@ -380,7 +380,7 @@ mod tests {
         places
     }
 
-    fn judged(changes_mm: &[f64], timing: Timing) -> Judgement {
+    fn judged(changes_mm: &[f64], timing: ZoneSettings) -> Judgement {
         let motion = motion();
         let pulses = pulses(&motion, changes_mm);
         judge(&row(), &Machine::default(), &motion, timing, &pulses, START_CYCLE)
@@ -388,7 +388,7 @@ mod tests {
 
     #[test]
     fn swings_with_their_leads_keep_every_plant_and_its_margin() {
-        let judgement = judged(&ideal_mm(Timing::default()), Timing::default());
+        let judgement = judged(&ideal_mm(ZoneSettings::default()), ZoneSettings::default());
         for plant in &judgement.plants {
             assert_eq!((plant.verdict, plant.swings), (Verdict::Kept, 1));
             // The servo knows the command only at the end of the pulse, 2 ms and 1.4 mm after its beginning.
@@ -408,7 +408,7 @@ mod tests {
 
     #[test]
     fn swings_commanded_where_they_should_be_done_damage_the_plants_at_speed() {
-        let timing = Timing::as_in_the_paper();
+        let timing = ZoneSettings::as_in_the_paper();
         let judgement = judged(&ideal_mm(timing), timing);
         assert_eq!(judgement.reached(), 2);
         // 180 ms of dead time and travel, less the margin.
@@ -418,9 +418,9 @@ mod tests {
 
     #[test]
     fn a_swing_that_is_late_by_less_than_the_margin_cuts_only_the_margin() {
-        let mut places = ideal_mm(Timing::default());
+        let mut places = ideal_mm(ZoneSettings::default());
         places[1] += 30.0;
-        let judgement = judged(&places, Timing::default());
+        let judgement = judged(&places, ZoneSettings::default());
         assert_eq!(judgement.plants[0].verdict, Verdict::MarginCut);
         assert_eq!(judgement.plants[1].verdict, Verdict::Kept);
         let error = judgement.plants[0].out_error_ticks.unwrap();
@@ -429,7 +429,7 @@ mod tests {
 
     #[test]
     fn a_plant_without_a_swing_is_damaged() {
-        let judgement = judged(&[200.0], Timing::default());
+        let judgement = judged(&[200.0], ZoneSettings::default());
         assert_eq!(judgement.reached(), 2);
         assert!(judgement.plants.iter().all(|plant| plant.swings == 0));
         assert!(judgement.swing_errors_ticks().is_empty());
@@ -438,7 +438,7 @@ mod tests {
 
     #[test]
     fn a_damaged_stem_belongs_to_the_nearest_plant_if_the_beam_sees_it() {
-        let (motion, timing) = (motion(), Timing::default());
+        let (motion, timing) = (motion(), ZoneSettings::default());
         let pulses = pulses(&motion, &ideal_mm(timing));
         for (is_seen, verdicts) in [(true, [Verdict::Damaged, Verdict::Kept]), (false, [Verdict::Kept; 2])] {
             let mut row = row();
@@ -450,8 +450,8 @@ mod tests {
 
     #[test]
     fn plants_that_share_a_swing_share_its_commands() {
-        let places = ideal_mm(Timing::default());
-        let judgement = judged(&[places[0], places[1], places[4]], Timing::default());
+        let places = ideal_mm(ZoneSettings::default());
+        let judgement = judged(&[places[0], places[1], places[4]], ZoneSettings::default());
         let [first, last] = judgement.plants.as_slice() else {
             panic!("two plants");
         };
@@ -463,16 +463,16 @@ mod tests {
 
     #[test]
     fn a_swing_for_a_weed_is_idle() {
-        let mut places = ideal_mm(Timing::default());
+        let mut places = ideal_mm(ZoneSettings::default());
         places.splice(3..3, [1600.0, 1700.0]);
-        let judgement = judged(&places, Timing::default());
+        let judgement = judged(&places, ZoneSettings::default());
         assert_eq!(judgement.idle_swings, 1);
         assert!(!judgement.weeds[0].cut);
     }
 
     #[test]
     fn a_tool_that_stays_out_weeds_nothing_and_harms_nothing() {
-        let judgement = judged(&[], Timing::default());
+        let judgement = judged(&[], ZoneSettings::default());
         assert_eq!(judgement.count(Verdict::Kept), 2);
         assert_eq!(judgement.weeded_share, 0.0);
         assert_eq!(judgement.plants[0].clear_mm, None);
@@ -480,17 +480,17 @@ mod tests {
 
     #[test]
     fn rolling_back_with_the_tool_in_damages_a_plant_that_was_kept_before() {
-        let places = ideal_mm(Timing::default());
+        let places = ideal_mm(ZoneSettings::default());
         let there = motion();
         let pulses = pulses(&there, &places);
         let back = motion().change_speed(-mm_s(1.0), 1000.0).roll_to(1000.0);
-        let judgement = judge(&row(), &Machine::default(), &back, Timing::default(), &pulses, START_CYCLE);
+        let judgement = judge(&row(), &Machine::default(), &back, ZoneSettings::default(), &pulses, START_CYCLE);
         assert_eq!(judgement.reached(), 2);
     }
 
     #[test]
     fn the_weedable_share_follows_from_canopy_margins_and_swings() {
-        let share = weedable_share(&row(), &Machine::default(), &motion(), Timing::default());
+        let share = weedable_share(&row(), &Machine::default(), &motion(), ZoneSettings::default());
         let lost_mm = 150.0 + 2.0 * 50.0 + 2.0 * 0.9 * mm_s(2.5) * 0.12;
         assert!((share - (1.0 - lost_mm / 600.0)).abs() < 0.001, "{share}");
     }

@@ -127,7 +127,7 @@ pub enum Did {
 
 /// Ground that was passed.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Ground {
+pub struct PassedGround {
     /// The work.
     pub did: Did,
     /// Distances by the wheel since the stretch began, in metres.
@@ -138,7 +138,7 @@ pub struct Ground {
     pub lines: Vec<Vec<Place>>,
 }
 
-impl Ground {
+impl PassedGround {
     /// Ground that begins here.
     fn begin(did: Did, at_m: f64, time_ms: u64) -> Self {
         Self { did, distance_m: at_m..at_m, time_ms: time_ms..time_ms, lines: Vec::new() }
@@ -151,7 +151,7 @@ pub struct Stretch {
     /// The events, in the log's order.
     pub events: Vec<Event>,
     /// The ground that was passed.
-    pub ground: Vec<Ground>,
+    pub ground: Vec<PassedGround>,
     /// Its beginning and end, by the log's clock.
     pub time_ms: Range<u64>,
 }

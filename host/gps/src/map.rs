@@ -4,7 +4,7 @@
 //! ground, weeded or not, is a line. An event without a position has no geometry, and gives the reason. The crate
 //! `geojson` writes the file.
 
-use crate::job::{Did, Event, EventKind, Ground, Job};
+use crate::job::{Did, Event, EventKind, Job, PassedGround};
 use crate::plane::Place;
 use chrono::{DateTime, SecondsFormat};
 use geojson::{Feature, FeatureCollection, Geometry, JsonValue, Position};
@@ -67,7 +67,7 @@ fn event(job: &Job, event: &Event) -> Feature {
 }
 
 /// A line for ground over which the machine was at work.
-fn ground(ground: &Ground) -> Option<Feature> {
+fn ground(ground: &PassedGround) -> Option<Feature> {
     let kind = match ground.did {
         Did::Weeded => "weeded",
         Did::Spared => "not_weeded",

@@ -12,7 +12,7 @@
 //!   in [`SWING_MS`]: 17 mm at 2.5 km/h. The speed also decides whether the gap between two zones is long enough to
 //!   swing in. So the log is replayed at three paces: even, and as slow and as fast as the log allows. At the slow pace
 //!   detections end [`DETECTION_TICKS`] earlier, and at the fast pace later. A swing differs only if no pace reproduces
-//!   it.
+//!   it. Swings into a gap and out again that the log lacks differ only if no pace lacks them.
 //! - The votes of a detection depend on the speed class, which the line does not tell. Votes agree if any possible
 //!   speed class gives them. Detections from before the start of the log are taken as logged.
 //! - The log does not hold the position of a change of state. The next swing shows the change, and its position is not

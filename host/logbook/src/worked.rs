@@ -31,6 +31,8 @@ pub struct Worked {
     pub time_ms: Range<u64>,
     /// The part of it in which the machine rolled.
     pub rolled_ms: u64,
+    /// The distance rolled in that part, forwards and backwards, in mm. Only as far as the wheel is known.
+    pub path_mm: f64,
     /// Net distance by the wheel in mm. `None` if a part of it is unknown.
     pub distance_mm: Option<f64>,
     /// Plants that the tool passed. `None` if the distance is unknown, or the beam missed a part of the ground.
@@ -42,8 +44,7 @@ pub struct Worked {
 impl Worked {
     /// The mean speed while the machine rolled, in km/h. `None` if the distance is unknown, or nothing was rolled.
     pub fn speed_km_h(&self) -> Option<f64> {
-        let mm = self.distance_mm.filter(|_| self.rolled_ms > 0)?;
-        Some(mm / self.rolled_ms as f64 * 3.6)
+        (self.distance_mm.is_some() && self.rolled_ms > 0).then(|| self.path_mm / self.rolled_ms as f64 * 3.6)
     }
 }
 
@@ -52,6 +53,8 @@ struct Open {
     worked: Worked,
     /// The beam's ground in mm, as far as it is known.
     beam_mm: Option<Range<f64>>,
+    /// The beam's last place in mm.
+    last_mm: Option<f64>,
     goes_on: bool,
 }
 
@@ -155,14 +158,16 @@ impl Open {
             time_ms: entry.time_ms..entry.time_ms,
             ..Worked::default()
         };
-        Self { worked, beam_mm: now_mm.map(|mm| mm..mm), goes_on: true }
+        Self { worked, beam_mm: now_mm.map(|mm| mm..mm), last_mm: now_mm, goes_on: true }
     }
 
     /// Takes the beam's place at a status or a change of state, and the speed up to there.
     fn take(&mut self, time_ms: u64, now_mm: Option<f64>, speed_mm_s: f64, goes_on: bool) {
         if speed_mm_s != 0.0 {
             self.worked.rolled_ms += time_ms.saturating_sub(self.worked.time_ms.end);
+            self.worked.path_mm += now_mm.zip(self.last_mm).map_or(0.0, |(mm, last_mm)| (mm - last_mm).abs());
         }
+        self.last_mm = now_mm;
         match (&mut self.beam_mm, now_mm) {
             (None, Some(mm)) => self.beam_mm = Some(mm..mm),
             (Some(ground_mm), Some(mm)) if goes_on => ground_mm.end = ground_mm.end.max(mm),
@@ -254,6 +259,21 @@ mod tests {
         let found = of(&format!("{HEAD}{rolling}{again}{rolling}"));
         let found: Vec<_> = found.iter().map(|of| (of.session, of.distance_mm, of.rolled_ms)).collect();
         assert_eq!(found, [(0, Some(1060.0), 2120), (1, Some(1060.0), 2120)]);
+    }
+
+    #[test]
+    fn rolling_back_at_work_counts_for_the_speed_and_not_for_the_distance() {
+        let mut text = format!("{HEAD}0,event,state is=work\n");
+        // Half a metre a second: 2 m on, 0.5 m back, and 1 m on.
+        let place_mm = |step: i64| if step <= 40 { 50 * step } else { (50 * step - 1000).max(4000 - 50 * step) };
+        for step in 0..=70 {
+            let speed_mm_s = if (41..=50).contains(&step) { -500 } else { 500 };
+            let status = status("work", place_mm(step), 0).replace("_s=0", &format!("_s={speed_mm_s}"));
+            writeln!(text, "{},status,{status}", 100 * step).unwrap();
+        }
+        let [worked] = &of(&text)[..] else { panic!("{:?}", of(&text)) };
+        assert_eq!((worked.distance_mm, worked.path_mm, worked.rolled_ms), (Some(2500.0), 3500.0, 7000));
+        assert!((worked.speed_km_h().expect("it is known") - 1.8).abs() < 1e-9);
     }
 
     #[test]

@@ -8,7 +8,7 @@ use field::motion::mm_s;
 use field::planting::{Planting, Sowing};
 use field::rolling::Rolling;
 use field::row::{Canopy, Kind, Row};
-use field::verdict::{Timing, Verdict, judge};
+use field::verdict::{Verdict, ZoneSettings, judge};
 use link::settings::{Setting, name};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -223,7 +223,7 @@ impl Simulation {
         let Ok(row) = Row::new(canopies.to_vec()) else {
             return Vec::new();
         };
-        let timing = Timing { margin_mm, stem_zone_mm, ..Timing::default() };
+        let timing = ZoneSettings { margin_mm, stem_zone_mm, ..ZoneSettings::default() };
         let (motion, pulses, start_cycle) = self.rolling.since(self.from_s);
         let judgement = judge(&row, &self.rolling.machine, &motion, timing, pulses, start_cycle);
         let mut plants = judgement.plants.iter().map(|plant| plant.verdict);

@@ -16,7 +16,7 @@ const BESIDE_STROKE_MS: f64 = 40.0;
 
 /// The servo, timed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Timing {
+pub(crate) struct TimedServo {
     /// The leads in milliseconds, out and in. By eye, `None` until the operator has set what was seen.
     pub(crate) leads: [Option<u16>; 2],
     /// Whether the operator timed it by eye.
@@ -26,7 +26,7 @@ pub(crate) struct Timing {
 }
 
 /// The leads that follow from the times. Those seen by eye are not shortened.
-pub(crate) fn leads(timings: &[Timing], settings: &Settings, arm: Arm) -> Vec<(Setting, u16)> {
+pub(crate) fn leads(timings: &[TimedServo], settings: &Settings, arm: Arm) -> Vec<(Setting, u16)> {
     let [saved_out_ms, saved_in_ms] = if keeps_stems(settings) {
         let [top_mm_s, zone_mm] =
             [Setting::TopSpeedMmS, Setting::StemZoneMm].map(|setting| settings.get(setting).into());
@@ -44,12 +44,12 @@ pub(crate) fn leads(timings: &[Timing], settings: &Settings, arm: Arm) -> Vec<(S
 }
 
 /// Whether a time may be the operator's, who adds a reserve.
-pub(crate) fn by_eye(timings: &[Timing]) -> bool {
+pub(crate) fn by_eye(timings: &[TimedServo]) -> bool {
     timings.iter().any(|timing| timing.by_eye)
 }
 
 /// The time of the stroke, from the times that were measured; 0 if it was timed by eye.
-pub(crate) fn travel_ms(timings: &[Timing]) -> f64 {
+pub(crate) fn travel_ms(timings: &[TimedServo]) -> f64 {
     match extremes(timings) {
         [Some((_, longest_ms)), Some((shortest_ms, _))] if !by_eye(timings) => {
             (f64::from(longest_ms.saturating_sub(shortest_ms)) - BESIDE_STROKE_MS).max(0.0)
@@ -67,7 +67,7 @@ pub fn saved_ms(top_speed_mm_s: f64, travel_ms: f64, zone_mm: f64, aside_mm: f64
 }
 
 /// The least and the greatest of the leads out, and of the leads in. `None` if none is known.
-pub(crate) fn extremes(timings: &[Timing]) -> [Option<(u16, u16)>; 2] {
+pub(crate) fn extremes(timings: &[TimedServo]) -> [Option<(u16, u16)>; 2] {
     [0, 1].map(|way: usize| {
         let leads = || timings.iter().filter_map(move |timing| timing.leads[way]);
         leads().min().zip(leads().max())

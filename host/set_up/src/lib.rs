@@ -28,7 +28,7 @@ pub use self::next_step::Step;
 pub use self::steps::{ManualStep, Task, steps};
 
 use self::circle::Arm;
-use self::leads::{Timing, by_eye, extremes, leads, travel_ms};
+use self::leads::{TimedServo, by_eye, extremes, leads, travel_ms};
 
 use control::say::command::{Action, Command};
 use control::settings::{Setting, Settings};
@@ -79,7 +79,7 @@ pub struct SetUp {
     pub arm: Arm,
     /// The settings in use, as far as the session shows them.
     pub settings: Settings,
-    timings: Vec<Timing>,
+    timings: Vec<TimedServo>,
     /// The measurements of the wheel.
     pub ticks_per_m: Vec<u16>,
     slip_permille: VecDeque<i32>,
@@ -125,7 +125,7 @@ impl SetUp {
     /// The lines from which [`SetUp::of_lines`] makes the same measurements.
     pub fn lines(&self) -> Vec<String> {
         let mut lines = Vec::new();
-        for Timing { leads, by_eye, over } in &self.timings {
+        for TimedServo { leads, by_eye, over } in &self.timings {
             lines.extend(OVER.into_iter().zip(over).map(|(setting, value)| format!("{}={value}", setting.text())));
             if let ([Some(out_ms), Some(in_ms)], false) = (leads, by_eye) {
                 lines.push(format!("calibrated lead_out_ms={out_ms} lead_in_ms={in_ms} set=yes"));
@@ -174,7 +174,7 @@ impl SetUp {
     /// Takes a lead that is set after a timing by eye. Only the first is what was seen: a later one may follow advice.
     fn take_seen(&mut self, lead: Setting, ms: u16) {
         if let Some(way) = LEADS.iter().position(|&known| known == lead)
-            && let Some(Timing { leads, by_eye: true, .. }) = self.timings.last_mut()
+            && let Some(TimedServo { leads, by_eye: true, .. }) = self.timings.last_mut()
             && lead.allows(ms)
         {
             leads[way].get_or_insert(ms);
@@ -198,9 +198,9 @@ impl SetUp {
         let over = over(&self.settings);
         match *event {
             EventLine::CalibratedBySwitch { out_ms, in_ms, .. } => {
-                self.timings.push(Timing { leads: [Some(out_ms), Some(in_ms)], by_eye: false, over });
+                self.timings.push(TimedServo { leads: [Some(out_ms), Some(in_ms)], by_eye: false, over });
             }
-            EventLine::CalibratedByEye {} => self.timings.push(Timing { leads: [None; 2], by_eye: true, over }),
+            EventLine::CalibratedByEye {} => self.timings.push(TimedServo { leads: [None; 2], by_eye: true, over }),
             EventLine::Slip { permille } => {
                 self.slip_permille.push_front(permille);
                 self.slip_permille.truncate(PLANTS);
@@ -216,7 +216,7 @@ impl SetUp {
     }
 
     /// The servo's timings over the present stroke and gap.
-    fn timed(&self, settings: &Settings) -> Vec<Timing> {
+    fn timed(&self, settings: &Settings) -> Vec<TimedServo> {
         self.timings.iter().copied().filter(|timing| timing.over == over(settings)).collect()
     }
 

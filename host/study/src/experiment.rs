@@ -17,14 +17,14 @@ use control::ground::features;
 use field::baselines;
 use field::budget::Budget;
 use field::conditions::Conditions;
-use field::driving::{Drive, drive};
+use field::driving::{DrivenRow, drive};
 use field::native::{self, Sensors};
 use field::optimum::undamaged_share;
 use field::pass::{Pass, Weeded};
 use field::row::{MAX_WIDTH_MM, Problem, Row};
 use field::stand::Stand;
 use field::tool_path::{Effect, effect};
-use field::verdict::{Judgement, Timing, Verdict, judge};
+use field::verdict::{Judgement, Verdict, ZoneSettings, judge};
 use knn::Example;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -50,7 +50,7 @@ pub enum Engine {
 /// A controller of the tool. The experiment compares controllers on the same plots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Treatment {
+pub enum ControllerKind {
     /// The firmware with its leads.
     Firmware,
     /// The firmware with both leads at 0: a queue of keep-out zones, without look-ahead.
@@ -62,7 +62,7 @@ pub enum Treatment {
     Ideal,
 }
 
-impl Treatment {
+impl ControllerKind {
     /// All, the firmware first.
     pub const ALL: [Self; 4] = [Self::Firmware, Self::WithoutLookAhead, Self::Paper, Self::Ideal];
 
@@ -87,7 +87,7 @@ pub struct Experiment {
     /// How often each speed and spacing is tried.
     pub replications: u32,
     /// The controllers.
-    pub controllers: Vec<Treatment>,
+    pub controllers: Vec<ControllerKind>,
     /// The field and the machine.
     pub conditions: Conditions,
     /// The features and the label of each example that is taught to the firmware.
@@ -102,7 +102,7 @@ pub struct Experiment {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlotOutcome {
     /// The controller.
-    pub controller: Treatment,
+    pub controller: ControllerKind,
     /// The plot's record.
     pub record: PlotRecord,
     /// Plants and weeds, counted.
@@ -151,7 +151,7 @@ impl Experiment {
             speeds_km_h: vec![1.0, 1.5, 2.0, 2.5],
             spacings_cm: vec![50.0, 60.0],
             replications: 3,
-            controllers: Treatment::ALL.to_vec(),
+            controllers: ControllerKind::ALL.to_vec(),
             conditions,
             examples: Vec::new(),
             seed,
@@ -235,7 +235,7 @@ impl Experiment {
         let Some((number, plot)) = fastest else { return Ok(None) };
         let (stand, _, mut pass) = self.grow((number, &plot), 0)?;
         pass.row.stems = Some(stand.stems.clone());
-        let weeded = weed(&pass, &sensors(&pass), &stand, Treatment::Firmware, engine)?;
+        let weeded = weed(&pass, &sensors(&pass), &stand, ControllerKind::Firmware, engine)?;
         let Pass { row, machine, motion, timing, .. } = &pass;
         let judgement = judge(row, machine, motion, *timing, &weeded.pulses, weeded.start_cycle);
         Ok(row.beginning(DRAWN_MM).map(|beginning| (beginning, judgement)))
@@ -270,7 +270,7 @@ impl Experiment {
         let Conditions { plot: area, machine: mechanism, .. } = &self.conditions;
         let rows = f64::from(area.rows);
         let record = PlotRecord { time_s: Some(drive.row_s + drive.turn_s), ..*plot.1 };
-        let outcome = |&controller: &Treatment| {
+        let outcome = |&controller: &ControllerKind| {
             let weeded = weed(&pass, &sensors, &stand, controller, engine)?;
             let Pass { row, machine, motion, timing, .. } = &pass;
             let (pulses, start_cycle) = (&weeded.pulses, weeded.start_cycle);
@@ -297,7 +297,7 @@ impl Experiment {
     }
 
     /// A row that has grown, how it is driven, and both as a pass for the firmware.
-    fn grow(&self, (number, plot): Plot, row: u32) -> Result<(Stand, Drive, Pass)> {
+    fn grow(&self, (number, plot): Plot, row: u32) -> Result<(Stand, DrivenRow, Pass)> {
         // Stand, driving and machine each have their own random numbers.
         let chance = |of: u64| {
             let nth_seed = (plot.replication - 1) / self.replications;
@@ -335,7 +335,7 @@ fn weed(
     pass: &Pass,
     sensors: &LazyCell<Sensors, impl FnOnce() -> Sensors>,
     stand: &Stand,
-    controller: Treatment,
+    controller: ControllerKind,
     engine: &Engine,
 ) -> Result<Weeded> {
     let firmware = |pass: &Pass| {
@@ -351,13 +351,13 @@ fn weed(
         }
     };
     match controller {
-        Treatment::Firmware => firmware(pass),
-        Treatment::WithoutLookAhead => {
-            let timing = Timing { lead_out_ms: 0, lead_in_ms: 0, ..pass.timing };
+        ControllerKind::Firmware => firmware(pass),
+        ControllerKind::WithoutLookAhead => {
+            let timing = ZoneSettings { lead_out_ms: 0, lead_in_ms: 0, ..pass.timing };
             firmware(&Pass { timing, ..pass.clone() })
         }
-        Treatment::Paper => Ok(baselines::as_in_the_paper(pass)),
-        Treatment::Ideal => Ok(baselines::ideal(pass, &stand.stems)),
+        ControllerKind::Paper => Ok(baselines::as_in_the_paper(pass)),
+        ControllerKind::Ideal => Ok(baselines::ideal(pass, &stand.stems)),
     }
 }
 
@@ -413,7 +413,7 @@ impl PlotOutcome {
 }
 
 /// The records of one controller.
-pub fn records(outcomes: &[PlotOutcome], controller: Treatment) -> Vec<PlotRecord> {
+pub fn records(outcomes: &[PlotOutcome], controller: ControllerKind) -> Vec<PlotRecord> {
     outcomes.iter().filter(|outcome| outcome.controller == controller).map(|outcome| outcome.record).collect()
 }
 

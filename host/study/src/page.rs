@@ -9,7 +9,7 @@ mod figure;
 
 use crate::evaluation::published::{Coefficients, MACHINES};
 use crate::evaluation::{Analysis, Response, ResponseAnalysis};
-use crate::experiment::{Total, Treatment};
+use crate::experiment::{ControllerKind, Total};
 use crate::statistics::{NoModel, mean};
 use crate::table::{NOTHING, Table, distinct, fixed, optional, short, significant, visible};
 use anyhow::{Context, Result};
@@ -84,7 +84,7 @@ impl Page<'_> {
                 format!("mean of {}", counted(efficiencies.len(), "plot")),
             ]);
         }
-        for total in self.totals.iter().filter(|total| total.plots.controller == Treatment::Firmware) {
+        for total in self.totals.iter().filter(|total| total.plots.controller == ControllerKind::Firmware) {
             rows.push(vec![
                 format!("row's ground weeded at {} km/h", short(total.speed_km_h())),
                 format!("{} %", fixed(100.0 * total.plots.weeded_share, 1)),
@@ -180,9 +180,9 @@ impl Controllers {
             ..Series::of(name, look)
         };
         // The largest share that this servo can weed is that of every controller.
-        let first = totals.first().map_or(Treatment::Firmware, |total| total.plots.controller);
+        let first = totals.first().map_or(ControllerKind::Firmware, |total| total.plots.controller);
         let bound = curve(BOUND, Look::LIMIT, first, |total| Some(100.0 * total.plots.weedable_share));
-        let present = || Treatment::ALL.into_iter().filter(|&controller| of(controller).next().is_some());
+        let present = || ControllerKind::ALL.into_iter().filter(|&controller| of(controller).next().is_some());
         let (mut figures, mut tables) = (Vec::new(), Vec::new());
         for ((chart, table, value), bound) in MEASURES.into_iter().zip([None, Some(bound), None]) {
             let looks = (0..).map(Look::of_series);
@@ -192,7 +192,7 @@ impl Controllers {
             curves.extend(bound);
             tables.push(by_speed(table, &curves));
         }
-        let firmware: Vec<&Total> = of(Treatment::Firmware).collect();
+        let firmware: Vec<&Total> = of(ControllerKind::Firmware).collect();
         Ok(Self {
             figures,
             tables,

@@ -4,7 +4,7 @@
 //! ([`Axis`]). At each point the firmware's native run weeds a plot. The ground is always the same for the same
 //! conditions.
 
-use crate::experiment::{Engine, Experiment, PlotOutcome, Treatment};
+use crate::experiment::{ControllerKind, Engine, Experiment, PlotOutcome};
 use crate::shard::{Numbered, Shard};
 use crate::statistics::Share;
 use anyhow::{Context, Error, Result, ensure};
@@ -100,7 +100,7 @@ pub struct Sweep {
     /// The second axis, if there is one.
     pub y: Option<Axis>,
     /// The controller.
-    pub controller: Treatment,
+    pub controller: ControllerKind,
     /// The fixed conditions.
     pub conditions: Conditions,
     /// Their name.
@@ -239,7 +239,7 @@ mod tests {
         Sweep {
             x: x.parse().unwrap(),
             y: y.map(|y| y.parse().unwrap()),
-            controller: Treatment::Firmware,
+            controller: ControllerKind::Firmware,
             conditions,
             field: "transplanted".to_owned(),
             speed_km_h: 2.5,

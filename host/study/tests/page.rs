@@ -7,7 +7,7 @@ use field::motion::Motion;
 use field::tool_path::{Effect, WeedCount};
 use roxmltree::{Document, Node, ParsingOptions};
 use study::evaluation::{Analysis, PlotRecord};
-use study::experiment::{PlotOutcome, Total, Treatment, Zones};
+use study::experiment::{ControllerKind, PlotOutcome, Total, Zones};
 use study::page::Page;
 use study::statistics::Mean;
 
@@ -39,7 +39,7 @@ fn trial(damages: bool) -> Analysis {
 }
 
 /// A total with these plants damaged, zones reached and ground weeded, each out of a thousand.
-fn total(controller: Treatment, speed_km_h: f64, damaged: u32, reached: u32, weeded: f64) -> Total {
+fn total(controller: ControllerKind, speed_km_h: f64, damaged: u32, reached: u32, weeded: f64) -> Total {
     let plants = if damaged == 0 { 97 } else { 1000 };
     let plots = PlotOutcome {
         controller,
@@ -58,14 +58,14 @@ fn total(controller: Treatment, speed_km_h: f64, damaged: u32, reached: u32, wee
 
 fn totals() -> Vec<Total> {
     vec![
-        total(Treatment::Firmware, 1.0, 0, 0, 421.0),
-        total(Treatment::WithoutLookAhead, 1.0, 0, 214, 448.0),
-        total(Treatment::Paper, 1.0, 0, 306, 605.0),
-        total(Treatment::Ideal, 1.0, 0, 935, 710.0),
-        total(Treatment::Firmware, 2.5, 0, 12, 243.0),
-        total(Treatment::WithoutLookAhead, 2.5, 29, 862, 339.0),
-        total(Treatment::Paper, 2.5, 142, 977, 501.0),
-        total(Treatment::Ideal, 2.5, 0, 991, 553.0),
+        total(ControllerKind::Firmware, 1.0, 0, 0, 421.0),
+        total(ControllerKind::WithoutLookAhead, 1.0, 0, 214, 448.0),
+        total(ControllerKind::Paper, 1.0, 0, 306, 605.0),
+        total(ControllerKind::Ideal, 1.0, 0, 935, 710.0),
+        total(ControllerKind::Firmware, 2.5, 0, 12, 243.0),
+        total(ControllerKind::WithoutLookAhead, 2.5, 29, 862, 339.0),
+        total(ControllerKind::Paper, 2.5, 142, 977, 501.0),
+        total(ControllerKind::Ideal, 2.5, 0, 991, 553.0),
     ]
 }
 

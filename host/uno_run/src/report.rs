@@ -262,14 +262,14 @@ pub fn introduction(Pass { row, machine, motion, .. }: &Pass) -> String {
 pub(crate) mod tests {
     use super::*;
     use field::row::Canopy;
-    use field::verdict::{Timing, judge};
+    use field::verdict::{ZoneSettings, judge};
     use uno::{CYCLES_PER_SECOND, Pulse};
 
     /// A pass in which the tool stayed in the row from one second on, and its outcome.
     pub fn ruined_row() -> (Pass, Outcome) {
         let canopies = vec![Canopy::plant(500.0, 150.0), Canopy::weed(750.0, 15.0), Canopy::plant(1000.0, 150.0)];
         let row = field::row::Row::new(canopies).unwrap();
-        let pass = Pass::at_speed(row, Machine::default(), Timing::default(), mm_s(1.0));
+        let pass = Pass::at_speed(row, Machine::default(), ZoneSettings::default(), mm_s(1.0));
         let frame = |rise, width_us: u64| Pulse { rise, fall: rise + width_us * CYCLES_PER_SECOND / 1_000_000 };
         let pulses = vec![frame(0, 2000), frame(CYCLES_PER_SECOND, 1500)];
         let outcome = Outcome {

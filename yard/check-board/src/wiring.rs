@@ -195,7 +195,8 @@ impl Boards {
                     }
                 }
                 if wrong.is_empty() {
-                    wrong.push(format!("encoder: four steps count as {steps:?}: check the wires at D2 and D3"));
+                    let checks = [Line::EncoderA, Line::EncoderB].map(check_wire).join(", ");
+                    wrong.push(format!("encoder: four steps count as {steps:?}: {checks}"));
                 }
             }
         }
@@ -207,8 +208,8 @@ impl Boards {
         // At rest no beam is broken, and no switch is closed.
         let at_rest = self.noticed(0)?;
         if at_rest.contains(&Line::Beam) {
-            let words = "it is broken at rest: its line is inverted, or the wire from A2 to D8 is missing";
-            wrong.push(format!("beam: {words}"));
+            let words = "it is broken at rest: if its line is not inverted";
+            wrong.push(format!("beam: {words}, {}", check_wire(Line::Beam)));
         }
         if at_rest.contains(&Line::EndSwitch) {
             wrong.push(format!("end switch: it is closed at rest: {}", check_wire(Line::EndSwitch)));

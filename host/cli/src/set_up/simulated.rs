@@ -9,7 +9,7 @@ use mechanics::machine::Machine;
 use mechanics::unit::{MM, SECOND};
 use set_up::circle::Arm;
 use set_up::{Task, steps};
-use study::experiment::{Engine, Experiment, Total, Treatment, totals};
+use study::experiment::{ControllerKind, Engine, Experiment, Total, totals};
 use uno_run::by_the_manual::Novice;
 use uno_run::report::number_table;
 
@@ -64,7 +64,7 @@ fn weeded(conditions: &Conditions, speed_km_h: f64) -> Result<Vec<Total>> {
     let experiment = Experiment {
         speeds_km_h: vec![speed_km_h],
         replications: REPLICATIONS,
-        controllers: vec![Treatment::Firmware],
+        controllers: vec![ControllerKind::Firmware],
         ..Experiment::as_in_the_paper(conditions.clone(), SEED)
     };
     Ok(totals(&experiment.run(&Engine::Native, |_| ())?))

@@ -4,21 +4,21 @@ use super::{Study, of};
 use field::tool_path::{Effect, unweeded_strip_mm};
 use std::cmp::Ordering::Equal;
 use study::evaluation::{Analysis, published};
-use study::experiment::{self, Experiment, PlotOutcome, Total, Treatment};
+use study::experiment::{self, ControllerKind, Experiment, PlotOutcome, Total};
 use study::statistics::Share;
 
 /// The result in words.
 pub(super) fn summary(experiment: &Experiment, totals: &[Total]) -> Vec<String> {
     let mut sentences: Vec<String> =
         experiment.controllers.iter().map(|&controller| damage(totals, controller)).collect();
-    if experiment.controllers.contains(&Treatment::Paper) {
+    if experiment.controllers.contains(&ControllerKind::Paper) {
         let (lowest, highest) = published::DAMAGED_PERCENT;
         sentences.push(format!(
             "The paper's controller is the paper's program on this machine. On its own machine the paper measured {lowest} to {highest} %. \
              `weeder trial --field paper` simulates that machine."
         ));
     }
-    let alarms: u32 = of(totals, Treatment::Firmware).map(|total| total.plots.alarms).sum();
+    let alarms: u32 = of(totals, ControllerKind::Firmware).map(|total| total.plots.alarms).sum();
     if alarms > 0 {
         sentences.push(format!(
             "In {alarms} of {} rows an alarm took the firmware's tool out for the rest of the row. Exclude those rows.",
@@ -26,7 +26,7 @@ pub(super) fn summary(experiment: &Experiment, totals: &[Total]) -> Vec<String> 
         ));
     }
     let short_of_bound =
-        of(totals, Treatment::Firmware).map(|total| total.plots.weedable_share - total.plots.weeded_share);
+        of(totals, ControllerKind::Firmware).map(|total| total.plots.weedable_share - total.plots.weeded_share);
     let zone = match experiment.conditions.timing().stem_zone_mm {
         0 => "canopy".to_owned(),
         zone_mm => format!("zone of {zone_mm} mm round the stem"),
@@ -37,7 +37,7 @@ pub(super) fn summary(experiment: &Experiment, totals: &[Total]) -> Vec<String> 
         100.0 * short_of_bound.fold(0.0, f64::max)
     ));
     let mut weeds = Effect::default();
-    of(totals, Treatment::Firmware).for_each(|total| weeds += total.plots.effect);
+    of(totals, ControllerKind::Firmware).for_each(|total| weeds += total.plots.effect);
     let Effect { damaged, unseen, swept, neighbours, .. } = weeds;
     if damaged + swept + neighbours > 0 {
         sentences.push(format!(
@@ -79,7 +79,7 @@ pub(super) fn about(study: &Study) -> String {
 }
 
 /// How many plants a controller damaged, and of several speeds the one with the highest share.
-fn damage(totals: &[Total], controller: Treatment) -> String {
+fn damage(totals: &[Total], controller: ControllerKind) -> String {
     let name = controller.title();
     let (damaged, plants) = of(totals, controller).fold((0, 0), |(damaged, plants), total| {
         (damaged + total.plots.effect.injured(), plants + total.plots.effect.plants)
@@ -101,7 +101,7 @@ fn damage(totals: &[Total], controller: Treatment) -> String {
 /// The differences between the paper's controller here and in the paper, at the paper's speeds, and their reason.
 pub(super) fn against_the_paper(outcomes: &[PlotOutcome]) -> Vec<String> {
     let (slowest, fastest) = published::SPEEDS_KM_H;
-    let mut records = experiment::records(outcomes, Treatment::Paper);
+    let mut records = experiment::records(outcomes, ControllerKind::Paper);
     records.retain(|record| (slowest..=fastest).contains(&record.speed_km_h));
     let said = Analysis::of(records).map(|analysis| analysis.against_the_paper()).unwrap_or_default();
     if said.is_empty() {

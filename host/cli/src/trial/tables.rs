@@ -5,7 +5,7 @@ use super::of;
 use comfy_table::{CellAlignment, Table};
 use field::budget;
 use field::tool_path::WeedCount;
-use study::experiment::{Total, Treatment};
+use study::experiment::{ControllerKind, Total};
 use study::statistics::Share;
 use study::table::{in_two_lines, optional};
 use uno_run::report::number_table;
@@ -46,7 +46,7 @@ fn without_interval(share: &str) -> String {
 }
 
 /// A controller's title without its article, for a table.
-fn name(controller: Treatment) -> &'static str {
+fn name(controller: ControllerKind) -> &'static str {
     let title = controller.title();
     ["a ", "the "].iter().find_map(|article| title.strip_prefix(article)).unwrap_or(title)
 }
@@ -69,7 +69,7 @@ pub(super) const LOSS_BUDGET: &str = "Loss budget of the row's ground with this 
 pub(super) fn loss_budget(totals: &[Total]) -> Table {
     let headings = budget::Part::ALL.map(|part| in_two_lines(part.title()));
     let mut table = number_table(std::iter::once("km/h".to_owned()).chain(headings), 0);
-    for total in of(totals, Treatment::Firmware) {
+    for total in of(totals, ControllerKind::Firmware) {
         let shares = total.plots.budget.tenths().map(|(_, tenths)| format!("{:.1}", f64::from(tenths) / 10.0));
         table.add_row(std::iter::once(total.speed_km_h().to_string()).chain(shares));
     }

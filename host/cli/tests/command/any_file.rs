@@ -6,7 +6,7 @@ use field::conditions::Conditions;
 use field::machine::Machine;
 use field::pass::Pass;
 use field::row::Row;
-use field::verdict::Timing;
+use field::verdict::ZoneSettings;
 use field::wiring;
 use files::bounded_file;
 use gps::{Job, Wanted, map, picture};
@@ -36,7 +36,7 @@ const READERS: [Reader; 12] = [
             let row = Row::parse_csv(path, bounded_file::bytes(path)?)?;
             let span = row.span_mm();
             if span.end - span.start < ROLLED_MM {
-                let pass = Pass::at_speed(row, Machine::default(), Timing::default(), 700.0);
+                let pass = Pass::at_speed(row, Machine::default(), ZoneSettings::default(), 700.0);
                 let changes = pass.machine.pin_changes(&pass.row, &pass.motion, 0);
                 assert!(changes.len() < 200_000, "{}", changes.len());
             }

@@ -14,7 +14,7 @@ use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::thread;
 use std::time::Duration;
-use study::experiment::{Engine, Experiment, Total, Treatment, totals};
+use study::experiment::{ControllerKind, Engine, Experiment, Total, totals};
 use tempfile::TempDir;
 use uno::pty::Pty;
 use uno_run::by_the_manual::Novice;
@@ -35,7 +35,7 @@ fn weeded(conditions: &Conditions, replications: u32, seed: u64) -> Total {
     let experiment = Experiment {
         speeds_km_h: vec![2.5],
         replications,
-        controllers: vec![Treatment::Firmware],
+        controllers: vec![ControllerKind::Firmware],
         ..Experiment::as_in_the_paper(conditions.clone(), seed)
     };
     totals(&experiment.run(&Engine::Native, |_| ()).expect("it can be weeded"))[0]
@@ -454,7 +454,7 @@ fn a_lead_that_is_too_long_for_the_beam_is_offered_with_a_lower_top_speed() {
     // Step 5 with the paper's blade: all six offers are taken.
     let lines = ["", "s", "s", "s", "s", "", "", "", "", "", "", "s", "s", ""].join("\n");
     let printed = printed(&typed(&mut command, lines), 0);
-    for words in ["top_speed_mm_s in mm/s, now 1300 [", "    lead_out_ms 258 ms\n"] {
+    for words in ["top_speed_mm_s in mm/s, now 1300 [", "    lead_out_ms 304 ms\n"] {
         assert!(printed.contains(words), "{words:?} is not in\n{printed}");
     }
     assert!(!printed.contains("error"), "{printed}");

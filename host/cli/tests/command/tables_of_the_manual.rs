@@ -11,6 +11,8 @@ use field::wiring::{self, WIRES};
 use link::settings::{help, name, unit};
 use link::{EVENTS, LineDescription, STATUS, ValueDescription, advice};
 use std::fmt::Write;
+use std::fs;
+use std::path::Path;
 use study::evaluation::published;
 use svg::node::element::tag::Type;
 use svg::parser::Event;
@@ -170,6 +172,27 @@ fn the_wiring_table_has_the_wires_of_the_simulated_machine() {
     let wires = WIRES.map(|wire| wire.pin.to_string());
     let contacts: Vec<String> = connections().into_iter().map(|[contact, ..]| contact).collect();
     assert_eq!(contacts, [&wires[..], &["D0, D1".to_owned()]].concat());
+}
+
+#[test]
+fn the_manual_and_the_page_name_no_pin_without_a_wire() {
+    let wired = WIRES.map(|wire| wire.pin.to_string());
+    let is_free = |pin: &&str| !["D0", "D1"].contains(pin) && !wired.iter().any(|wired| wired == pin);
+    let is_pin = |word: &&str| word.strip_prefix('D').is_some_and(|number| number.parse::<u8>().is_ok());
+    for folder in ["docs", "page/src/words"] {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(folder);
+        for path in fs::read_dir(folder).expect("it is there").map(|entry| entry.expect("it is listed").path()) {
+            // The tester has pins of its own.
+            let is_text = path.extension().is_some_and(|end| end == "md" || end == "json" || end == "ts");
+            if is_text && !path.ends_with("check-board.md") {
+                let text = fs::read_to_string(&path).expect("it is text");
+                let mut words = text.split(|c: char| !c.is_alphanumeric());
+                assert_eq!(words.find(|word| is_pin(word) && is_free(word)), None, "{}", path.display());
+            }
+        }
+    }
+    let drawn = texts(&expect_file!["../../../../docs/wiring.svg"].data());
+    assert!(!drawn.iter().any(|(.., text)| is_pin(&text.as_str()) && is_free(&text.as_str())), "{drawn:?}");
 }
 
 #[test]

@@ -145,7 +145,7 @@ parameters! {
         width_factor: f64 = 1.6, 1 to 5, "two thirds of the weeds are within this factor of that width: some are as wide as plants", "assumed";
     }
     /// The ground.
-    ground: Ground {
+    ground: GroundConditions {
         slip_percent: f64 = 5.0, -30 to 30, "mean slip of the wheel that the encoder counts: above 0 where it drives, below where it is dragged", "assumed, for a driving wheel on tilled soil, not calibrated";
         slip_scatter_percent: f64 = 3.0, 0 to 10, "slip is within this of its mean, evenly spread, and changes every metre or two", "assumed";
     }

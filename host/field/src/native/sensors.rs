@@ -156,7 +156,7 @@ mod tests {
     use crate::machine::{Dirt, tests::count_at};
     use crate::native::TURN_S;
     use crate::planting::Planting;
-    use crate::verdict::Timing;
+    use crate::verdict::ZoneSettings;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -179,7 +179,7 @@ mod tests {
                 .change_speed(speed_mm_s, 900.0)
                 .roll_to(3500.0)
                 .with_slip(|| rng.random_range(-0.05..0.1));
-            let pass = Pass { motion, ..Pass::at_speed(row, machine, Timing::default(), speed_mm_s) };
+            let pass = Pass { motion, ..Pass::at_speed(row, machine, ZoneSettings::default(), speed_mm_s) };
             let mut told = 0;
             for Turn { time_s, position, edges } in Sensors::new(&pass, TURN_S).turns() {
                 assert_eq!(position, count_at(&pass.machine, &pass.motion, time_s), "seed {seed} at {time_s} s");

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 /// Margin and leads, as the firmware's settings have them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Timing {
+pub struct ZoneSettings {
     /// Margin on both sides of a canopy.
     pub margin_mm: u32,
     /// Lead of the command to leave the row.
@@ -18,14 +18,14 @@ pub struct Timing {
     pub stem_zone_mm: u32,
 }
 
-impl Default for Timing {
+impl Default for ZoneSettings {
     /// For the unloaded servo of [`Machine::default`](crate::machine::Machine). The firmware's own default is for a servo in the soil.
     fn default() -> Self {
         Self { margin_mm: 50, lead_out_ms: 180, lead_in_ms: 40, stem_zone_mm: 0 }
     }
 }
 
-impl Timing {
+impl ZoneSettings {
     /// The paper's schedule, without leads (Eq. 1 to 3).
     pub fn as_in_the_paper() -> Self {
         Self { lead_out_ms: 0, lead_in_ms: 0, ..Self::default() }

@@ -1,6 +1,6 @@
 //! A stretch while it is read: the wheel's statuses, the events and the ground so far.
 
-use super::{Did, Event, EventKind, Ground};
+use super::{Did, Event, EventKind, PassedGround};
 use crate::receiver::Fix;
 use control::say::command::Action;
 use link::{Class, EventLine, Mode, Status};
@@ -30,7 +30,7 @@ pub(super) struct Reading {
     pub(super) beam_to_tool_mm: f64,
     pub(super) fixes: Vec<Fix>,
     pub(super) events: Vec<Event>,
-    pub(super) ground: Vec<Ground>,
+    pub(super) ground: Vec<PassedGround>,
     /// The first event of the row.
     row_from: usize,
     pub(super) time_ms: Option<Range<u64>>,
@@ -83,7 +83,7 @@ impl Reading {
         let last = self.wheel.last().copied().filter(|_| shows_the_same);
         self.wheel.push(here);
         match self.ground.last().map(|passed| (passed.did, passed.distance_m.start)) {
-            None => self.ground.push(Ground::begin(did, at_m, entry.time_ms)),
+            None => self.ground.push(PassedGround::begin(did, at_m, entry.time_ms)),
             Some((passed, _)) if (passed == Did::Rolled) != (did == Did::Rolled) => {
                 self.turn_to(did, at_m, entry.time_ms);
                 // `start` forgets the ground: the beam sees again what ends ahead of it.
@@ -131,7 +131,7 @@ impl Reading {
             passed.distance_m.end = at_m;
         }
         passed.time_ms.end = time_ms.max(passed.time_ms.start);
-        self.ground.push(Ground::begin(did, at_m, time_ms));
+        self.ground.push(PassedGround::begin(did, at_m, time_ms));
     }
 
     /// The link ends or begins with the first of these lines. Marks a restart of the machine at work.

@@ -171,6 +171,7 @@ mod tests {
             gaps: 0..0,
             time_ms: 1000 * start_s..1000 * (start_s + seconds),
             rolled_ms: 1000 * seconds,
+            path_mm: 1000.0 * metres,
             distance_mm: Some(1000.0 * metres),
             plants: Some(metres as u32 * 2),
             swings: metres as u32,

@@ -1,6 +1,6 @@
 //! An experiment's plots as a CSV table.
 
-use super::{PlotOutcome, Treatment};
+use super::{ControllerKind, PlotOutcome};
 use crate::evaluation::PlotRecord;
 use field::budget::Part;
 use serde_json::Value;
@@ -27,7 +27,11 @@ fn line(outcome: &PlotOutcome) -> Vec<(String, String)> {
 ///
 /// # Errors
 /// The errors of the writer.
-pub fn write_csv(outcomes: &[PlotOutcome], controllers: &[Treatment], to: impl io::Write) -> Result<(), csv::Error> {
+pub fn write_csv(
+    outcomes: &[PlotOutcome],
+    controllers: &[ControllerKind],
+    to: impl io::Write,
+) -> Result<(), csv::Error> {
     let mut writer = csv::Writer::from_writer(to);
     let lines = outcomes.iter().filter(|outcome| controllers.contains(&outcome.controller)).map(line);
     for (number, line) in lines.enumerate() {

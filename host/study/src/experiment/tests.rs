@@ -19,7 +19,7 @@ impl Experiment {
 
     /// The same by the firmware alone.
     fn of_firmware(self) -> Self {
-        Self { controllers: vec![Treatment::Firmware], ..self }
+        Self { controllers: vec![ControllerKind::Firmware], ..self }
     }
 }
 
@@ -45,7 +45,10 @@ fn the_result_does_not_depend_on_the_number_of_threads() {
 #[test]
 fn a_controller_gets_the_same_field_with_and_without_others() {
     let all = experiment(&[1.5], "transplanted");
-    assert_eq!(records(&run(&all), Treatment::Firmware), records(&run(&all.of_firmware()), Treatment::Firmware));
+    assert_eq!(
+        records(&run(&all), ControllerKind::Firmware),
+        records(&run(&all.of_firmware()), ControllerKind::Firmware)
+    );
 }
 
 #[test]
@@ -55,7 +58,7 @@ fn the_firmware_damages_no_plant_and_weeds_up_to_the_bound_where_the_papers_dama
         // A mean swing's: the margin and the slip, which has the tool swing early, cover the slowest.
         let totals = all(&experiment.with(&[("lead_out_ms", 180.0)]));
         let of = |controller| totals.iter().filter(move |total| total.plots.controller == controller);
-        for total in of(Treatment::Firmware) {
+        for total in of(ControllerKind::Firmware) {
             assert_eq!(
                 (total.plots.effect.damaged, total.plots.zones.reached, total.plots.alarms),
                 (0, 0, 0),
@@ -63,8 +66,8 @@ fn the_firmware_damages_no_plant_and_weeds_up_to_the_bound_where_the_papers_dama
             );
             assert!(total.plots.weedable_share - total.plots.weeded_share < 0.05, "{total:?}");
         }
-        assert!(of(Treatment::Ideal).all(|total| total.plots.effect.damaged == 0));
-        let damage: Vec<f64> = of(Treatment::Paper).filter_map(|total| total.damage().percent()).collect();
+        assert!(of(ControllerKind::Ideal).all(|total| total.plots.effect.damaged == 0));
+        let damage: Vec<f64> = of(ControllerKind::Paper).filter_map(|total| total.damage().percent()).collect();
         // A weed as wide as a plant takes the only slot at any speed. Late swings increase with speed.
         let (slow, fast) = damage.split_at(3);
         assert!(slow.iter().all(|percent| *percent < 1.0) && fast[0] > 1.0, "{damage:?}");
@@ -77,9 +80,9 @@ fn the_ideal_controller_damages_no_plant_in_any_field_and_weeds_more_than_the_fi
     // Without look-ahead, the firmware weeds more, but damages plants.
     for preset in presets().filter(|preset| *preset != "paper") {
         let totals = all(&experiment(&[1.0, 2.5], preset));
-        for pair in totals.chunks(Treatment::ALL.len()) {
+        for pair in totals.chunks(ControllerKind::ALL.len()) {
             let (firmware, ideal) = (pair[0].plots, pair[3].plots);
-            assert_eq!((firmware.controller, ideal.controller), (Treatment::Firmware, Treatment::Ideal));
+            assert_eq!((firmware.controller, ideal.controller), (ControllerKind::Firmware, ControllerKind::Ideal));
             assert_eq!(ideal.effect.damaged, 0, "{preset}");
             assert!(ideal.weeded_share > firmware.weeded_share, "{preset}");
         }
@@ -251,7 +254,7 @@ fn a_configured_shorter_stroke_weeds_more_and_reaches_no_canopy() {
 #[test]
 fn field_efficiency_falls_with_speed_as_the_paper_s_equation_has_it() {
     let outcomes = run(&Experiment { replications: 6, ..experiment(&[1.0, 1.5, 2.0, 2.5], "transplanted") });
-    let analysis = Analysis::of(records(&outcomes, Treatment::Firmware)).unwrap();
+    let analysis = Analysis::of(records(&outcomes, ControllerKind::Firmware)).unwrap();
     let slope = analysis.responses[3].model.as_ref().unwrap().term("speed").unwrap().clone();
     assert!((slope.estimate - -2.06).abs() < 3.0 * slope.standard_error + 0.5, "{slope:?}");
     for treatment in analysis.treatments() {
@@ -265,7 +268,7 @@ fn a_plot_s_area_has_three_decimals_in_a_table() {
     // 3 rows of 2 m by 0.4 m are 2.4000000000000004 m2 in binary.
     let outcomes = run(&experiment(&[1.0], "transplanted").of_firmware().with(&[("plot.row_m", 2.0)]));
     let mut table = Vec::new();
-    write_csv(&outcomes, &[Treatment::Firmware], &mut table).unwrap();
+    write_csv(&outcomes, &[ControllerKind::Firmware], &mut table).unwrap();
     let table = String::from_utf8(table).unwrap();
     let areas: Vec<&str> = table.lines().filter_map(|line| line.split(',').nth(8)).collect();
     assert_eq!(areas, ["area_m2", "2.4", "2.4"]);

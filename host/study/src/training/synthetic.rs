@@ -22,7 +22,7 @@ use field::native::{Sensors, TURN_S, beams_before};
 use field::pass::Pass;
 use field::planting::Planting;
 use field::row::{Canopy, Kind, Row};
-use field::verdict::Timing;
+use field::verdict::ZoneSettings;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rig::Rig;
@@ -206,7 +206,7 @@ fn roll_past(row: &Row, headland_mm: f64, speed_mm_s: f64, slip: f64) -> Result<
     // The firmware knows only the wheel's size. A slipping wheel is a wheel of another size.
     let machine = Machine { wheel_mm: standard.wheel_mm * (1.0 + slip), ..standard };
     let motion = Motion::steady(-headland_mm, ACCELERATION_MM_S2, speed_mm_s, row.span_mm().end + RUN_OUT_MM);
-    let pass = Pass { motion, ..Pass::at_speed(row.clone(), machine, Timing::default(), speed_mm_s) };
+    let pass = Pass { motion, ..Pass::at_speed(row.clone(), machine, ZoneSettings::default(), speed_mm_s) };
     let recorder = Recorder { row, seen: RefCell::new(Vec::new()) };
     let readings = |turn: u32, position: i64| {
         Readings::new(Instant::default() + Interval::from_ms(turn), Position::new(position as i32))

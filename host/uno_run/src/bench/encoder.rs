@@ -89,7 +89,7 @@ pub const JITTER: f64 = 0.3;
 
 /// The result of a trial.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Counted {
+pub struct RateResult {
     /// The other load.
     pub load: Load,
     /// Counts that came, net.
@@ -104,7 +104,7 @@ pub struct Counted {
     pub line_share: f64,
 }
 
-impl Counted {
+impl RateResult {
     /// Whether no count was lost and the rest of the firmware ran on.
     pub fn is_passed(&self) -> bool {
         let is_heard = self.load == Load::Idle || self.line_share >= SILENT_SHARE;
@@ -119,7 +119,7 @@ const SETTLE_MS: u64 = 100;
 ///
 /// # Errors
 /// If the ELF cannot be run.
-pub fn turn(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Counted> {
+pub fn turn(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<RateResult> {
     let mut uno = run::boot(elf, &[])?;
     ask(&mut uno, "events on")?;
     let step_cycles = CYCLES_PER_SECOND as f64 / counts_per_s;
@@ -138,7 +138,7 @@ pub fn turn(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Counted> 
 }
 
 /// Asks the firmware for its position after `counts` edges, when the encoder stands.
-fn counted(uno: &mut Uno, turning: Turning, counts: i64, line_share: f64) -> Result<Counted> {
+fn counted(uno: &mut Uno, turning: Turning, counts: i64, line_share: f64) -> Result<RateResult> {
     uno.run_for_ms(SETTLE_MS)?;
     let status = match Status::ask(uno) {
         Ok(status) => Some(status),
@@ -146,7 +146,7 @@ fn counted(uno: &mut Uno, turning: Turning, counts: i64, line_share: f64) -> Res
         // A console that was starved is as bad as a count that was lost.
         Err(_) => None,
     };
-    Ok(Counted {
+    Ok(RateResult {
         load: turning.load,
         true_ticks: if turning.direction == Direction::Forward { counts } else { -counts },
         position_ticks: status.as_ref().map(|status| status.position_ticks),
@@ -176,7 +176,7 @@ const SECTIONS_PASSED: u32 = 12;
 ///
 /// # Errors
 /// If the ELF cannot be run.
-pub fn turn_at_worst(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Counted> {
+pub fn turn_at_worst(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<RateResult> {
     let mut uno = run::boot(elf, &[])?;
     ask(&mut uno, "events on")?;
     let mut rng = ChaCha8Rng::seed_from_u64(1);

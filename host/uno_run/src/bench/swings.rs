@@ -9,7 +9,7 @@ use field::machine::Machine;
 use field::motion::mm_s;
 use field::pass::Pass;
 use field::planting::{Planting, WEED_MARGIN_MM};
-use field::verdict::{Judgement, Timing, Verdict};
+use field::verdict::{Judgement, Verdict, ZoneSettings};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -112,7 +112,7 @@ pub fn lateness(elf: &Path, rows: &Rows, progress: impl Fn(f64) + Sync) -> Resul
         .into_par_iter()
         .map(|seed| {
             let row = planting(seed, rows).grow(seed)?;
-            let pass = Pass::at_speed(row, rows.machine, Timing::default(), mm_s(rows.speed_km_h));
+            let pass = Pass::at_speed(row, rows.machine, ZoneSettings::default(), mm_s(rows.speed_km_h));
             let outcome = run(&pass, elf, |_| ())?;
             progress((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / count);
             Ok(outcome)
