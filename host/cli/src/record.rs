@@ -18,6 +18,8 @@ use std::time::{Duration, Instant};
 
 /// Time between two checks whether to end.
 const LOOK: Duration = Duration::from_millis(20);
+/// Most events between two looks at the receiver.
+const MOST_EVENTS: usize = 64;
 
 #[derive(Args)]
 #[command(after_help = "\
@@ -67,7 +69,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         }
         // All that waits: a read of the receiver may take 16 ms on Windows, in which several events come.
         let mut patience = LOOK;
-        while let Some(heard) = rows.next(patience) {
+        for _ in 0..MOST_EVENTS {
+            let Some(heard) = rows.next(patience) else { break };
             patience = Duration::ZERO;
             let written = logs.take(&heard);
             logs.go_on_after(written, heard.row, &chosen)?;

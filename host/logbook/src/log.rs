@@ -73,9 +73,12 @@ pub enum LogError {
     /// The file is no log.
     #[error("{0} exists already, and is no log that can be continued: choose another name")]
     NoLog(PathBuf),
-    /// The file would be, or soon be, too long to be read.
+    /// The file would soon be too long to be read.
     #[error("{0} is longer than 192 MiB, and is not continued: choose another name")]
     Long(PathBuf),
+    /// With more lines, the file could not be read.
+    #[error("{0} is full: no further line is written; write another log")]
+    Full(PathBuf),
     /// The lines of two programs would damage each other.
     #[error("another program writes {0}: end that one, or choose another name")]
     Shared(PathBuf),
@@ -220,7 +223,7 @@ impl LogWriter {
 
     fn line(&mut self, time_ms: u64, kind: Kind, line: &str) -> Result<(), LogError> {
         if self.file.get_ref().metadata().is_ok_and(|there| there.len() >= FULL) {
-            return Err(LogError::Long(self.path.clone()));
+            return Err(LogError::Full(self.path.clone()));
         }
         self.added += 1;
         // A record is one line of the table, even if the system's message about a lost port has several.

@@ -84,7 +84,12 @@ pub fn worked(log: &[Entry]) -> Vec<Worked> {
                 }
                 now_mm = follower.mm(status.position);
                 if let (Some((line, time_ms, mm, _)), Some(now_mm)) = (last, now_mm)
-                    && (!goes_on || is_gap(entry.time_ms.saturating_sub(time_ms) as f64, (now_mm - mm) / 1000.0))
+                    // After a `revert` in hold the distance starts anew, and no status is missing.
+                    && (if *goes_on {
+                        is_gap(entry.time_ms.saturating_sub(time_ms) as f64, (now_mm - mm) / 1000.0)
+                    } else {
+                        open.is_some()
+                    })
                 {
                     (gaps, missed_mm) = (gaps + 1, missed_mm.max(now_mm));
                     // An event may have come in the gap, and ended a stretch.

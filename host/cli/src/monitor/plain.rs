@@ -111,7 +111,9 @@ impl<'a> Talk<'a> {
                 }
             }
             let is_opening = self.standing.iter().any(|row| row.is_there.is_none());
-            let is_next = self.is_idle() || is_opening && self.waiting.front().is_some_and(|line| self.is_hold(line));
+            // A blank line sends nothing.
+            let goes_first = |line: &Line| line.text.trim().is_empty() || self.is_hold(line);
+            let is_next = self.is_idle() || is_opening && self.waiting.front().is_some_and(goes_first);
             let patience = if is_opening { OPENING } else { STALLED };
             let next = if is_next {
                 self.waiting.pop_front()

@@ -65,8 +65,8 @@ fn watch(
             }
             model.take(heard);
         }
-        // The process would end before a HOLD is typed that came with Ctrl-C.
-        let has_held = model.hold.as_ref().is_none_or(Hold::is_over);
+        // The process would end before a HOLD is typed that came with Ctrl-C, or reaches a row that is not open yet.
+        let has_held = model.hold.as_ref().is_none_or(Hold::is_obeyed);
         if stop.load(Ordering::Relaxed)
             && (has_held || stopped_at.get_or_insert_with(Instant::now).elapsed() > LAST_HOLD)
         {

@@ -230,17 +230,18 @@ mod tests {
     #[test]
     fn a_log_may_take_one_gap_near_the_shortest_and_refuse_another() {
         // All paces take the first and the last gap, and one refuses the two between.
-        let [all, refused] =
-            [&[(1000, 1300), (2000, 2280), (3000, 3280), (4000, 4300)][..], &[(1000, 1300), (4000, 4300)]];
-        for logged in [all, refused, &[all[0], all[1], all[3]], &[all[0], all[2], all[3]]] {
-            assert_eq!(line_that_differs(logged, &[all, all, refused]), None, "{logged:?}");
+        let all = [(1000, 1300), (2000, 2280), (3000, 3280), (4000, 4300)];
+        let refused = [all[0], all[3]];
+        let paces = [&all[..], &all, &refused];
+        for logged in [&all[..], &refused, &[all[0], all[1], all[3]], &[all[0], all[2], all[3]]] {
+            assert_eq!(line_that_differs(logged, &paces), None, "{logged:?}");
         }
         // Each of two paces takes another gap, and the log neither.
         assert_eq!(line_that_differs(&[], &[&all[1..2], &all[2..3]]), None);
         // All paces take what the log refuses, or none takes what it has.
-        assert_eq!(line_that_differs(&all[1..], &[all, all, refused]), Some(Some(2000)));
-        assert_eq!(line_that_differs(&all[..3], &[all, all, refused]), Some(None));
+        assert_eq!(line_that_differs(&all[1..], &paces), Some(Some(2000)));
+        assert_eq!(line_that_differs(&all[..3], &paces), Some(None));
         let more = [all[0], (1500, 1800), all[3]];
-        assert_eq!(line_that_differs(&more, &[all, all, refused]), Some(Some(1500)));
+        assert_eq!(line_that_differs(&more, &paces), Some(Some(1500)));
     }
 }

@@ -48,12 +48,13 @@ impl OfLog {
         };
         let distance_m = stretches.iter().map(|worked| worked.distance_mm).sum::<Option<f64>>().map(|mm| mm / 1000.0);
         let rolled_h = stretches.iter().map(|worked| worked.rolled_ms).sum::<u64>() as f64 / 3.6e6;
+        let path_km = stretches.iter().map(|worked| worked.path_mm).sum::<f64>() / 1e6;
         Self {
             plot: record.plot,
             lines: (first.lines.start, last.lines.end - 1),
             time_s: parts.iter().map(time_ms).sum::<Option<u64>>().map(|ms| ms as f64 / 1000.0),
             distance_m,
-            speed_km_h: distance_m.filter(|m| rolled_h > 0.0 && *m > 0.0).map(|m| m / 1000.0 / rolled_h),
+            speed_km_h: distance_m.filter(|_| rolled_h > 0.0 && path_km > 0.0).map(|_| path_km / rolled_h),
             planned_km_h: record.speed_km_h,
             plants: stretches.iter().map(|worked| worked.plants).sum(),
             damaged: record.damaged.filter(|_| record.plants.is_none()),
@@ -207,6 +208,11 @@ mod tests {
         // With the pause between the two parts.
         assert_eq!((joined[0].time_s, joined[0].distance_m), (Some(70.0), Some(30.0)));
         assert!((records[0].speed_km_h - 1.8).abs() < 1e-9);
+        // Pushed back 5 m, and rolled on: 40 m in 80 s.
+        let mut pushed_back = [plot(1, 1.8)];
+        let stretches_back = [Worked { path_mm: 40_000.0, ..stretch(0, 80, 30.0) }];
+        join(&mut pushed_back, &stretches_back, &[]).expect("they match");
+        assert!((pushed_back[0].speed_km_h - 1.8).abs() < 1e-9 && pushed_back[0].area_m2 == Some(12.0));
         let joined = join(&mut records, &stretches, &[1, 2, 1, 0]).expect("they match");
         assert_eq!((joined[0].time_s, joined[0].distance_m), (Some(32.0), Some(15.5)), "without the other plot");
         let joined = join(&mut records, &stretches, &[1, 0, 1, 2]).expect("they match");
