@@ -5,13 +5,17 @@ import packedHex from "firmware.deflated";
 import packedLanguages from "languages.deflated";
 import packedRust from "rust.deflated";
 import { Rust } from "./rust.ts";
-import type { Translations } from "./words/words.ts";
 
 /** The Rust's module: for workers, and for further instances with their own state. */
 export let module: WebAssembly.Module;
 /** The firmware as a HEX file. */
 export let hex = "";
-export let translations: Translations;
+/** The table of each translation. */
+export let translations: {
+    readonly hi: typeof import("./words/hi.json");
+    readonly es: typeof import("./words/es.json");
+    readonly fr: typeof import("./words/fr.json");
+};
 let rust: Rust;
 
 function unpack(packed: Uint8Array<ArrayBuffer>): Response {

@@ -27,7 +27,8 @@ test("the page weeds a row with the real firmware, no plant is damaged, and it s
         plants: globalThis.simulation.outcome.totals.plants,
         passed: globalThis.simulation.outcome.plants.size,
         worked: globalThis.simulation.track.filter(({ acrossMm }) => acrossMm < 1).length,
-        // Plants of this stretch, of which some may be passed before the switch is on, round which the firmware's zone is as wide as the canopy and both margins.
+        // Plants of this stretch round which the firmware's zone is as wide as the canopy and both margins. The first
+        // may be passed before the switch is on.
         free: globalThis.simulation.machine.things.filter(
             ({ kind, placeMm, widthMm }) =>
                 kind === "plant" &&

@@ -84,7 +84,7 @@ pub fn worked(log: &[Entry]) -> Vec<Worked> {
                 }
                 now_mm = follower.mm(status.position);
                 if let (Some((line, time_ms, mm, _)), Some(now_mm)) = (last, now_mm)
-                    // After a `revert` in hold the distance starts anew, and no status is missing.
+                    // `revert` in hold begins the distance anew: that is no gap.
                     && (if *goes_on {
                         is_gap(entry.time_ms.saturating_sub(time_ms) as f64, (now_mm - mm) / 1000.0)
                     } else {

@@ -33,13 +33,6 @@ export interface Language {
 /** The names of the holes in a text. */
 type Holes<Text extends string> = Text extends `${string}{${infer Hole}}${infer Rest}` ? Hole | Holes<Rest> : never;
 
-/** The translations: each JSON file of this folder. */
-export interface Translations {
-    readonly hi: typeof import("./hi.json");
-    readonly es: typeof import("./es.json");
-    readonly fr: typeof import("./fr.json");
-}
-
 const { hi, es, fr } = translations;
 /** The languages. */
 export const LANGUAGES = { en, hi, es, fr } as const satisfies Readonly<Record<string, Language>>;
