@@ -179,7 +179,7 @@ impl Ground {
         self.guard = Guard::NONE;
         self.distrust_slip();
         let has_left = self.has_left();
-        self.keep_out.invalidate(self.detector.frontier());
+        self.keep_out.invalidate(self.detector.frontier() + self.geometry.beyond_canopy());
         self.keep_out.mark_dropped(has_left);
     }
 

@@ -266,8 +266,9 @@ impl Settings {
 
     /// The first contradiction between settings, if any.
     ///
-    /// At top speed, a plant just behind the beam must not reach the tool's margin before the tool is out. This takes the lead, an
-    /// eighth more for variation of the speed, and the sensor's response.
+    /// At top speed, the zone of a plant just behind the beam must not reach the tool before the tool is out. The zone is the margin
+    /// and, round a narrow plant, half of the stem zone. The tool takes the lead, an eighth more for variation of the speed, and the
+    /// sensor's response.
     #[inline(never)]
     pub fn contradiction(&self) -> Option<Contradiction> {
         if self.get(Setting::ServoInUs) == self.get(Setting::ServoOutUs) {
@@ -281,7 +282,7 @@ impl Settings {
         let lead_out_ms = self.get(Setting::LeadOutMs);
         let notice_ms = lead_out_ms + lead_out_ms / 8 + self.get(Setting::BeamResponseMs) + 1;
         let rolled = Speed(self.get(Setting::TopSpeedMmS) as i16).distance_in_ms(notice_ms);
-        let needed_mm = self.get(Setting::MarginMm) + rolled.0 as u16 + 1;
+        let needed_mm = self.get(Setting::MarginMm) + self.get(Setting::StemZoneMm) / 2 + rolled.0 as u16 + 1;
         let beam_to_tool_mm = self.get(Setting::BeamToToolMm);
         if beam_to_tool_mm < needed_mm {
             return Some(Contradiction::BeamTooNear { needed_mm });

@@ -76,7 +76,7 @@ fn a_missed_plant_is_kept_with_its_own_swing() {
 fn a_missed_plant_keeps_its_stem_zone_and_the_scatter() {
     for zone_mm in [0.0, 100.0] {
         let seen_mm = [500.0, 1000.0, 2000.0].map(canopy).to_vec();
-        let mut rolling = guarding(seen_mm, &[(Setting::StemZoneMm, zone_mm as u16)]);
+        let mut rolling = guarding(seen_mm, &[(Setting::TopSpeedMmS, 1000), (Setting::StemZoneMm, zone_mm as u16)]);
         rolling.roll_to(2400.0, 400.0);
         rolling.assert_guarded(&[1500.0]);
         let half_mm = 30.0 + zone_mm / 2.0 + MARGIN_MM;

@@ -12,7 +12,7 @@ use uno::elf::{Image, Size};
 use uno_run::firmware::workspace_root;
 
 /// The budgets, as in .ci/run.
-const FLASH_BYTES: u64 = 29_660;
+const FLASH_BYTES: u64 = 29_760;
 const SRAM_BYTES: u64 = 1100;
 
 /// The stack's room at link time, by memory.x.

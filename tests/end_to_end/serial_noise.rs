@@ -25,6 +25,19 @@ fn swings(run: &Run) -> Vec<(bool, f64)> {
     run.commands().iter().map(|command| (command.is_out, run.place_mm(command.rise_cycle))).collect()
 }
 
+/// A start bit, eight bits and a stop bit at 115200 baud. Every Uno is 2.1 % off, and a receiver takes 4 %.
+#[test]
+fn the_firmware_sends_at_115200_baud() {
+    let mut uno = started();
+    uno.received_bytes();
+    uno.send(b"help\n");
+    run_for_ms(&mut uno, 50);
+    let cycles: Vec<u64> = uno.received_bytes().iter().map(|received| received.cycle).collect();
+    let shortest = cycles.windows(2).map(|bytes| bytes[1] - bytes[0]).min().expect("the help has many bytes") as f64;
+    let nominal = 10.0 * 16e6 / 115_200.0;
+    assert!((shortest / nominal - 1.0).abs() < 0.025, "{shortest} cycles instead of {nominal:.0}");
+}
+
 /// Weeds with `noise` on the line every 50 ms and returns the lines that the firmware sent.
 #[track_caller]
 fn answers_to(mut noise: impl FnMut() -> Vec<u8>) -> Vec<String> {

@@ -1,7 +1,7 @@
 //! Closed ground: where the tool must be out.
 //!
 //! Ground is closed if no beam has seen it, or within the margin of a canopy. A detection without an end or a class and an
-//! expected plant count as canopies. The tool must be out while closed ground lies within the leads. It must also be out while the
+//! expected plant count as canopies. One without an end may be narrow, so half of a stem zone is closed ahead of it. The tool must be out while closed ground lies within the leads. It must also be out while the
 //! machine is so fast that a plant just behind the beam would reach it first.
 
 use super::{Ground, unclassified::Known};
@@ -46,7 +46,8 @@ impl Ground {
         let out = self.leads.out;
         // Hysteresis: the machine has to slow down by an eighth.
         let lead = if tool_out { out + Length(out.0 / 8) } else { out };
-        (self.tool() + lead) - self.detector.frontier() >= -self.geometry.margin().max(self.geometry.second_beam())
+        let zone = self.geometry.margin() + self.geometry.beyond_canopy();
+        (self.tool() + lead) - self.detector.frontier() >= -zone.max(self.geometry.second_beam())
     }
 
     /// Whether any ground between two distances from the tool is closed: unknown, or within the margin of a canopy. An open
@@ -59,7 +60,7 @@ impl Ground {
         self.keep_out.is_closed(near, far, margin)
             // Both: a detection of the second beam lies ahead of a wide one that is open in the first.
             || self.unclassified.known == Known::Canopy && reaches(self.unclassified.canopy.leading)
-            || self.detector.open().is_some_and(reaches)
+            || self.detector.open().is_some_and(|leading| reaches(leading - self.geometry.beyond_canopy()))
             || self.guard.awaited(self.detector.frontier(), &self.geometry).is_some_and(reaches)
             || self.second_beam.open_alone().is_some_and(reaches)
     }

@@ -16,23 +16,18 @@ use heapless::Vec;
 pub const CAPACITY: usize = 16;
 
 /// Returns the width of the leaves on either side of a single plant under which the tool may work. A canopy of `width` is kept in
-/// `zone` around its middle, or in full if `zone` is 0 or wider.
+/// `zone` around its middle, or in full if `zone` is 0. Where the canopy is narrower than the zone, the result is negative: so far
+/// the zone reaches beyond it.
 ///
 /// A stem stands near the middle of its canopy. But two plants that have grown together, or a plant with a weed beside it, look the
 /// same to the beam. So at most 11/64 of the zone are cut off either end: no stem stands so near to an end.
 pub const fn trim(width: Length, zone: Length) -> Length {
-    let (most, beside) = ((zone.0 as u16 * 11) >> 6, width.0 - zone.0);
-    let half = beside as u16 >> 1;
-    Length(if beside <= 0 {
-        0
-    } else if half < most {
-        half as i16
-    } else {
-        most as i16
-    })
+    // The shift rounds down, so a zone is never too short.
+    let (half, most) = ((width.0 - zone.0) >> 1, ((zone.0 as u16 * 11) >> 6) as i16);
+    Length(if half < most { half } else { most })
 }
 
-/// A canopy to keep out of: its full width, or the stem zone of a single plant.
+/// A canopy to keep out of: its full width or the stem zone, whichever is wider. Of a single plant, the stem zone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Canopy {
     /// Where it begins.
@@ -47,10 +42,16 @@ impl Canopy {
     /// No canopy.
     pub(super) const NONE: Self = Self { leading: WrappedPosition::new(0), trailing: WrappedPosition::new(0), trim: 0 };
 
-    /// The canopy of a detection, if it is a plant: `zone` around its middle, or all of it if `zone` is 0 or wider.
-    pub(super) fn of(detection: &Detection, zone: Length) -> Self {
-        let trim = trim(detection.width(), zone).0 as u8;
-        Self { leading: detection.leading, trailing: detection.trailing, trim }
+    /// The canopy of a detection, if it is a plant, and `zone` around its middle. Leaves beside the zone are kept too, unless it
+    /// `is_single`.
+    pub(super) fn of(detection: &Detection, zone: Length, is_single: bool) -> Self {
+        let trim = trim(detection.width(), zone);
+        let beyond = trim.min(Length::ZERO);
+        Self {
+            leading: detection.leading + beyond,
+            trailing: detection.trailing - beyond,
+            trim: if is_single { trim.max(Length::ZERO).0 as u8 } else { 0 },
+        }
     }
 
     /// Where the tool has to be out, without the margin.
@@ -284,15 +285,28 @@ mod tests {
     #[test]
     fn a_single_plant_is_closed_in_its_stem_zone_and_margins() {
         let zone = Length(160);
-        for (width, trim) in [(100, 0), (160, 0), (170, 5), (213, 26), (214, 27), (215, 27), (300, 27)] {
-            assert_eq!(Canopy::of(&Detection::whole(1000, 1000 + width), zone).trim, trim, "{width}");
+        for (width, trim) in [(160, 0), (170, 5), (213, 26), (214, 27), (215, 27), (300, 27)] {
+            assert_eq!(Canopy::of(&Detection::whole(1000, 1000 + width), zone, true).trim, trim, "{width}");
         }
         let plant = Detection::whole(1000, 1300);
-        assert_eq!(Canopy::of(&plant, Length::ZERO).trim, 0);
+        for (zone, is_single) in [(Length::ZERO, true), (zone, false)] {
+            assert_eq!(Canopy::of(&plant, zone, is_single), canopy(1000, 1300));
+        }
         let mut keep_out = KeepOut::NONE;
-        keep_out.push(&Canopy::of(&plant, zone), at(0), MARGIN).unwrap();
+        keep_out.push(&Canopy::of(&plant, zone, true), at(0), MARGIN).unwrap();
         assert!(!closed(&keep_out, 931, 931) && closed(&keep_out, 932, 932));
         assert!(closed(&keep_out, 1368, 1368) && !closed(&keep_out, 1369, 1369));
+    }
+
+    #[test]
+    fn a_canopy_that_is_narrower_than_the_stem_zone_is_closed_in_all_of_the_zone() {
+        for (width, from, to) in [(0, 920, 1080), (60, 950, 1110), (99, 969, 1130), (159, 999, 1160), (160, 1000, 1160)]
+        {
+            for is_single in [true, false] {
+                let zone = Canopy::of(&Detection::whole(1000, 1000 + width), Length(160), is_single);
+                assert_eq!(zone, canopy(from, to), "{width}");
+            }
+        }
     }
 
     #[test]

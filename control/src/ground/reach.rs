@@ -73,9 +73,14 @@ impl Geometry {
         self.lengths[2]
     }
 
-    /// Width kept around a single plant's middle; 0 keeps the whole canopy.
+    /// Width kept around a plant's middle; 0 keeps the whole canopy.
     pub const fn stem_zone(&self) -> Length {
         self.lengths[3]
+    }
+
+    /// How far a stem zone may reach beyond a canopy: half of it, if the canopy is narrow.
+    pub const fn beyond_canopy(&self) -> Length {
+        Length(self.stem_zone().0 >> 1)
     }
 
     /// The widest canopy.
@@ -126,7 +131,7 @@ impl Geometry {
             let Some(setting) = Setting::from_index(LENGTHS[0] as u8 + index as u8) else { break };
             self.lengths[index] = self.length(settings, setting, excess);
         }
-        self.guarded = self.guard_scatter() + Length(self.stem_zone().0 >> 1);
+        self.guarded = self.guard_scatter() + self.beyond_canopy();
         self.memory = Length(self.scale.length(metre).0 * MEMORY_M);
     }
 

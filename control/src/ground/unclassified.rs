@@ -35,9 +35,9 @@ impl Ground {
     /// Closes the ground from the start of a detection until it is classified.
     pub fn await_class(&mut self, detection: Detection, of_second: bool) {
         // What only one beam saw is not certain to be a single plant.
-        let zone = if of_second || self.detector.take_parted() { Length::ZERO } else { self.geometry.stem_zone() };
-        self.unclassified =
-            Unclassified { detection, canopy: Canopy::of(&detection, zone), of_second, known: Known::Canopy };
+        let is_single = !(of_second || self.detector.take_parted());
+        let canopy = Canopy::of(&detection, self.geometry.stem_zone(), is_single);
+        self.unclassified = Unclassified { detection, canopy, of_second, known: Known::Canopy };
         // A wide detection reaches the second beam before the first has seen its end.
         if let Some(begin) = self.second_beam.open() {
             self.widen(begin, begin);

@@ -7,7 +7,7 @@
 //! unknown, because it was never seen or was forgotten. An alarm opens nothing.
 //!
 //! With a stem zone, the tool may work at either end of a wider detection: on half of the excess, but on at most 11/64
-//! of the zone's width. A second beam can only add to a detection.
+//! of the zone's width. A narrower detection is kept in all of the zone. A second beam can only add to a detection.
 //!
 //! Guarded ground is closed like a canopy from then on, with or without a plant.
 //!
@@ -382,13 +382,15 @@ impl Model {
         is_canopy.then_some((stretch.leading + less, (stretch.trailing - less).min(stretch.margin_to)))
     }
 
-    /// The greatest part of a stretch's end that the machine may open as leaves beside the stem zone.
+    /// The greatest part of a stretch's end that the machine may open as leaves beside the stem zone. It is negative where the zone
+    /// reaches beyond a narrow stretch.
     fn given_up(&self, stretch: &Stretch) -> i64 {
         let first = self.stem_zones.partition_point(|&(from, _)| from <= stretch.trailing).saturating_sub(1);
-        let zones = self.stem_zones[first..].iter().filter(|&&(_, zone)| zone > 0);
-        let beside = |zone: i64| ((self.widest(stretch) - zone) / 2).clamp(0, zone * 11 / 64);
-        let most = zones.map(|&(_, zone)| beside(zone)).max();
-        most.map_or(0, |most| if most > 0 { most + 1 } else { 0 })
+        let beside = |&(_, zone): &(i64, i64)| match zone {
+            0 => 0,
+            zone => ((self.widest(stretch) - zone) / 2).min(zone * 11 / 64) + 1,
+        };
+        self.stem_zones[first..].iter().map(beside).max().unwrap_or(0)
     }
 
     /// Whether the machine may merge two neighbours.

@@ -31,8 +31,8 @@ impl ZoneSettings {
         Self { lead_out_ms: 0, lead_in_ms: 0, ..Self::default() }
     }
 
-    /// The ground that the tool must not enter for a plant, without the margin: its canopy. With a stem zone it is the
-    /// part that the firmware keeps of a plant seen whole.
+    /// The ground that the tool must not enter for a plant, without the margin: its canopy. With a stem zone it is what the
+    /// firmware keeps of a plant seen whole, at least the zone.
     pub(super) fn kept_mm(&self, plant: &Canopy) -> Range<f64> {
         let (span, zone_mm) = (plant.span_mm(), f64::from(self.stem_zone_mm));
         // In steps of 0.1 mm, which is finer than the wheel's.
