@@ -70,6 +70,18 @@ mod tests {
     }
 
     #[test]
+    fn narrow_unknowns_alone_are_no_alarm() {
+        for before in [&[][..], &[(Class::Weed, 10), (Class::Plant, 150)]] {
+            let mut run = UnknownRun::NONE;
+            for &(class, width_mm) in before {
+                assert!(!run.count(class, width_mm, 3));
+            }
+            assert!((0..100).all(|_| !run.count(Class::Unknown, 10, 3)), "they are kept as plants");
+            assert!(run.count(Class::Weed, 10, 3), "behind {before:?}");
+        }
+    }
+
+    #[test]
     fn medium_widths_neither_count_nor_restart_the_count() {
         for between in
             [(Class::Unknown, NARROW_MM), (Class::Unknown, WIDE_MM - 1), (Class::Weed, 2 * WIDE_MM), (Class::Weed, 0)]

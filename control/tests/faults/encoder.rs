@@ -400,3 +400,18 @@ fn spikes_at_a_plant_in_the_beam_of_a_machine_that_stands_are_no_breaks() {
         assert_eq!(drive.alarm(), alarm);
     }
 }
+
+#[test]
+fn hands_in_the_beam_of_a_machine_that_stands_in_hold_are_no_alarm() {
+    for broken_s in [0.02, 0.3] {
+        let mut drive = Drive::in_hold();
+        drive.roll(0.0, 0.2);
+        for _ in 0..6 {
+            drive.beam(true);
+            drive.roll(0.0, broken_s);
+            drive.beam(false);
+            drive.roll(0.0, 0.5);
+        }
+        assert_eq!(drive.machine.state(), State::Hold, "{broken_s} s");
+    }
+}

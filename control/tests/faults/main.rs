@@ -177,6 +177,13 @@ fn a_tool_that_dies_in_the_row_is_an_alarm_at_a_speed_at_which_each_swing_is_sho
         let alarm = drive.alarm().map(|alarm| (alarm, swings));
         assert_eq!(alarm, alarm_behind.map(|swings| (Alarm::ToolStuck, swings)));
         assert!(swings > 7, "{swings} swings");
+        if alarm.is_some() {
+            // The switch is repaired: the swings before count no more.
+            drive.machine.readings.end_switch_on = true;
+            drive.machine.clear();
+            drive.roll(0.0, 0.1);
+            assert_eq!(drive.alarm(), None);
+        }
     }
 }
 
