@@ -88,6 +88,9 @@ function faults() {
 async function html() {
     const { code } = await transform(readFileSync("src/words/en.ts"), { loader: "ts" });
     const { words } = await import(`data:text/javascript,${encodeURIComponent(code)}`);
+    // Shown in every language, because no code has chosen one.
+    const others = Object.values(JSON.parse(readFileSync(translations(), "utf8")));
+    words.notStarted = [words, ...others.map(({ words }) => words)].map(({ notStarted }) => notStarted).join(" / ");
     const source = readFileSync("src/index.html", "utf8").replaceAll(/\n +/g, "\n");
     return source.replaceAll(/\$(\w+)/g, (_, name) => {
         if (words[name] === undefined) throw new Error(`src/words/en.ts lacks the text ${name} of src/index.html`);

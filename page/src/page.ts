@@ -165,8 +165,31 @@ globalThis.addEventListener("beforeunload", (event) => {
 globalThis.addEventListener("keydown", ({ key }) => {
     if (key !== "Escape") return;
     if (!page.html("view-try").hidden) tryPanel.hold();
-    for (const panel of workPanels) panel.hold();
+    // Its result is shown there.
+    if (workPanels.filter((panel) => panel.hold()).length > 0) location.hash = "#work";
 });
+
+// The wheel scrolls. Chromium would change the number in the field that has the focus.
+document.addEventListener(
+    "wheel",
+    ({ target: field }) => {
+        if (!(field instanceof HTMLInputElement && field.type === "number")) return;
+        field.readOnly = true;
+        setTimeout(() => {
+            field.readOnly = false;
+        });
+    },
+    { capture: true, passive: true },
+);
+
+// The keyboard of an iPhone covers the page's end, where HOLD is. A larger page has no keyboard there.
+const { visualViewport } = globalThis;
+for (const changed of ["resize", "scroll"])
+    visualViewport?.addEventListener(changed, () => {
+        const { height, offsetTop, scale } = visualViewport;
+        const covered = scale > 1 ? 0 : Math.max(innerHeight - height - offsetTop, 0);
+        document.documentElement.style.setProperty("--keyboard", `${covered}px`);
+    });
 
 /** Light or dark as in the system, or always light, for sunlight. */
 const light = page.button("light", () => {
@@ -267,6 +290,8 @@ function frame(nowMs: number): void {
 }
 
 requestAnimationFrame(frame);
+
+page.html("not-started").remove();
 
 // For tests, and for the browser's console.
 Object.assign(globalThis, { simulation });

@@ -14,4 +14,7 @@ else
             ({ say }) => say("twoBuilds"),
             () => words.twoBuilds,
         )
-        .then((text) => document.body.prepend(text));
+        .then((text) => {
+            document.getElementById("not-started")?.remove();
+            document.body.prepend(text);
+        });

@@ -44,6 +44,13 @@ test("a screen reader says a state, a reason that lasts and an alarm, and no num
     await part(page, "heard")
         .filter({ hasText: /^Hold\. The tool is out: the machine holds until it is started/ })
         .waitFor({ state: "attached" });
+    // A region that appears with its text is not read out.
+    const away = await page.evaluate(() =>
+        [...document.querySelectorAll("[role=status]")]
+            .filter((region) => getComputedStyle(region).display === "none" || region.matches("[hidden]"))
+            .map(({ outerHTML }) => outerHTML),
+    );
+    assert.deepEqual(away, []);
     await listen(page);
     await part(page, "start").click();
     await part(page, "heard")
@@ -252,5 +259,56 @@ test("state, reason, alarm and HOLD have a contrast of 7 to 1 and more in each s
     await pass(page, 5);
     await state("alarm");
     await assertReadable(page, "#try-panel", ["state", "why", "hold", "alarm-name", "alarm-advice", "clear"]);
+    await close(opened);
+});
+
+test("an unknown detection is seen in its zone, light and dark", async () => {
+    const opened = await open(browser, "record");
+    const { page } = opened;
+    for (const colorScheme of ["light", "dark"] as const) {
+        await page.emulateMedia({ colorScheme });
+        const contrast = await page.evaluate(() => {
+            const brush = document.createElement("canvas").getContext("2d", { willReadFrequently: true });
+            if (!brush) throw new Error("there is no canvas");
+            const lightness = (...fills: string[]) => {
+                for (const fill of fills) {
+                    brush.fillStyle = fill;
+                    brush.fillRect(0, 0, 1, 1);
+                }
+                const [red = 0, green = 0, blue = 0] = [...brush.getImageData(0, 0, 1, 1).data].map(
+                    (part) => ((part / 255 + 0.055) / 1.055) ** 2.4,
+                );
+                return 0.2126 * red + 0.7152 * green + 0.0722 * blue;
+            };
+            const probe = document.body.appendChild(document.createElement("i"));
+            const colour = (name: string) => {
+                probe.style.color = `var(--${name})`;
+                return getComputedStyle(probe).color;
+            };
+            const zone = lightness(colour("card"), colour("window"));
+            const [dark = 0, bright = 0] = [zone, lightness(colour("unknown"))].sort((one, other) => one - other);
+            return (bright + 0.05) / (dark + 0.05);
+        });
+        assert(contrast >= 3, `${colorScheme}: ${contrast.toFixed(2)}`);
+    }
+    await close(opened);
+});
+
+test("with the system's own few colours the legend and the lamp keep theirs, and one view is marked", async () => {
+    const opened = await open(browser, "try");
+    const { page } = opened;
+    await page.emulateMedia({ forcedColors: "active" });
+    const found = await page.evaluate(() => {
+        const colours = (selector: string, name: "backgroundColor" | "borderBottomColor", pseudo?: string) =>
+            new Set([...document.querySelectorAll(selector)].map((one) => getComputedStyle(one, pseudo)[name])).size;
+        document.querySelector("#lamp")?.classList.add("lit");
+        return {
+            legend: colours("#view-try .legend li:not(.sign)", "backgroundColor", "::before"),
+            lamp: colours("#lamp, body", "backgroundColor"),
+            views: colours("nav a", "borderBottomColor"),
+            tabs: colours("#try-panel [role=tab]", "borderBottomColor"),
+        };
+    });
+    assert.deepEqual(found, { legend: 5, lamp: 2, views: 2, tabs: 2 });
     await close(opened);
 });

@@ -59,6 +59,11 @@ test("an Uno with an empty flash is flashed through its bootloader, and is worke
     await close(opened);
 });
 
+test("the Uno alone leaves more than 30 KiB: a Nano starts at 0x7800 with each bootloader", () => {
+    const roomy = BOARDS.filter(({ roomBytes }) => roomBytes > 0x7800).map(({ id }) => id);
+    assert.deepEqual(roomy, ["uno"]);
+});
+
 test("an old bootloader is flashed at its own rate and its fault is told, or that it leaves too little", async (test) => {
     const uno = await VirtualUno.start(test, ...OLD);
     const opened = await open(browser, "flash", undefined, [uno]);

@@ -122,6 +122,34 @@ test("no control moves under the pointer while the machine drives, and into its 
     }
 });
 
+test("the mouse wheel scrolls the page, and changes no number in a field", async () => {
+    const opened = await tryIt(browser);
+    const { page } = opened;
+    await part(page, "tab-settings").click();
+    const margin = page.locator("#try-panel [data-setting=margin_mm]");
+    await margin.evaluate((field) => field.scrollIntoView({ block: "center" }));
+    await margin.fill("45");
+    await margin.hover();
+    const before = await page.evaluate(() => scrollY);
+    await page.mouse.wheel(0, -100);
+    await page.waitForFunction((before) => scrollY < before, before);
+    await page.keyboard.type("6");
+    assert.equal(await margin.inputValue(), "456");
+    await close(opened);
+});
+
+test("a page that does not start says so, and one that starts does not", async () => {
+    const { page } = await open(browser, "work");
+    assert.equal(await page.locator("#not-started").count(), 0);
+    await page.addInitScript(() => Reflect.deleteProperty(globalThis, "DecompressionStream"));
+    await page.reload();
+    await page.evaluate(() => {
+        for (const animation of document.getAnimations()) animation.finish();
+    });
+    await page.getByText("This page has not started").waitFor();
+    await page.context().close();
+});
+
 test("a plant that was damaged is marked in the row, and told in words", async () => {
     const opened = await tryIt(browser);
     const { page } = opened;

@@ -7,7 +7,7 @@ import test from "node:test";
 import type { Browser } from "playwright-core";
 import { LANGUAGES } from "../src/words/words.ts";
 import { assertOnScreen } from "./boxes.ts";
-import { close, launch, launchFirefox, openAt } from "./browser.ts";
+import { close, launch, launchFirefox, openAt, PHONE } from "./browser.ts";
 import { folder, plugIn, serve } from "./serving.ts";
 import { pass, tryIt, part as tryPart } from "./trying.ts";
 
@@ -111,7 +111,35 @@ test("with large text or zoom the dock takes at most half of the screen, HOLD is
                 return { hold: isWhole("hold"), clear: isWhole("clear"), isHalf: height <= innerHeight / 2 + 1 };
             });
             const where = `${width}x${height}, ${rem} px, ${language}`;
+            if (width > 320 && width < 400) {
+                const wide = await page.evaluate(() =>
+                    ["settings", "calibrate", "examples", "console"].map((tab) => {
+                        document.querySelector<HTMLElement>(`#try-panel [data-part=tab-${tab}]`)?.click();
+                        return document.documentElement.scrollWidth;
+                    }),
+                );
+                assert(Math.max(...wide) <= width, `${where}: the tabs are ${wide} wide`);
+            }
             assert.deepEqual(found, { hold: true, clear: true, isHalf: true }, where);
         }
+    await close(opened);
+});
+
+test("the dock is above a phone's keyboard, and covers nothing on paper", async (test) => {
+    const browser = await launch();
+    test.after(() => browser.close());
+    const opened = await tryIt(browser, PHONE);
+    const { page } = opened;
+    const keyboard = 300;
+    const bottom = await page.evaluate((keyboard) => {
+        const viewport = globalThis.visualViewport ?? new VisualViewport();
+        Object.defineProperty(viewport, "height", { value: innerHeight - keyboard });
+        viewport.dispatchEvent(new Event("resize"));
+        return document.querySelector("#try-panel .dock")?.getBoundingClientRect().bottom;
+    }, keyboard);
+    assert.equal(bottom, PHONE.height - keyboard);
+    await page.emulateMedia({ media: "print" });
+    const dock = tryPart(page, "dock");
+    assert.equal(await dock.evaluate((dock) => getComputedStyle(dock).position), "static");
     await close(opened);
 });

@@ -272,3 +272,44 @@ test("another Uno is not said to have restarted at work because the one before w
     assert.match((await part("alarm-advice").textContent()) ?? "", /^Check get, /);
     await close(opened);
 });
+
+test("another Uno that is plugged in does not get what was typed for the one before, and the same one does", async (test) => {
+    const uno = await VirtualUno.start(test, "--elf", FIRMWARE, "--stand");
+    const other = await VirtualUno.start(test, "--elf", FIRMWARE, "--stand");
+    const opened = await open(browser, "work", PHONE, [uno, other, uno]);
+    const { page } = opened;
+    const part = (name: string) => page.locator(`#view-work [data-part="${name}"]`);
+    /** Pulls the cable, and plugs one in at another port. */
+    const plugIn = async (port: number) => {
+        uno.pull();
+        await part("state").filter({ hasText: "no machine" }).waitFor();
+        uno.plugIn();
+        await page.evaluate((port) => {
+            const { serial } = navigator as unknown as { serial: { ports: SerialPort[] } & EventTarget };
+            const event = new Event("connect");
+            Object.defineProperty(event, "target", { value: serial.ports[port] });
+            serial.dispatchEvent(event);
+        }, port);
+    };
+    await page.getByRole("button", { name: "Connect an Uno" }).click();
+    for (const [at, line] of ["save", "clear"].entries()) {
+        await part("typed").fill(line);
+        await page.locator("#work-panel").getByRole("button", { name: "Send" }).click();
+        await part("said").locator("div", { hasText: /^ok$/ }).nth(at).waitFor();
+    }
+    await part("tab-settings").click();
+    await page.locator("#work-panel [data-setting=margin_mm]").fill("31");
+    await plugIn(2);
+    await part("state").filter({ hasText: "hold" }).waitFor();
+    await part("settings-send").filter({ hasText: "Send 1 change and save" }).waitFor();
+    // Also at a later attempt.
+    other.refuses = { name: "NetworkError", message: "Failed to open serial port." };
+    await plugIn(1);
+    await page.getByText(/Not connected: /).waitFor();
+    delete other.refuses;
+    await part("alarm-name").filter({ hasText: "settings_lost" }).waitFor();
+    await part("settings-send")
+        .filter({ hasText: /^Save$/ })
+        .waitFor();
+    await close(opened);
+});

@@ -21,7 +21,7 @@ export interface Board {
 
 export const BOARDS: readonly Board[] = [
     { id: "uno", name: "Arduino Uno", baud: 115_200, roomBytes: 32_256, isOld: false },
-    { id: "nano", name: "Arduino Nano", baud: 115_200, roomBytes: 32_256, isOld: false },
+    { id: "nano", name: "Arduino Nano", baud: 115_200, roomBytes: 30_720, isOld: false },
     { id: "old", name: { text: "oldBoard" }, baud: 57_600, roomBytes: 30_720, isOld: true },
 ];
 

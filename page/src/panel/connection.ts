@@ -1,7 +1,8 @@
 // The real Uno at the browser's serial port: buttons connect and disconnect it. After its cable was unplugged and
 // plugged in again, it is connected automatically.
 
-import type { Parts } from "../dom.ts";
+import { wait } from "../clock.ts";
+import { type Parts, plain } from "../dom.ts";
 import { choosePort, PortError, SerialLine, sessionOver, whyNoSerial } from "../link/serial.ts";
 import { english, say, told } from "../words/words.ts";
 import { sentence } from "./machine.ts";
@@ -10,6 +11,10 @@ import { Update } from "./update.ts";
 
 /** The firmware's rate. */
 const BAUD = 115_200;
+
+/** How often a port is opened that is back, and the time between: another program may have it for some seconds. */
+const TRIES = 10;
+const AGAIN_MS = 1000;
 
 /** Why a machine is not flashed. */
 const AT_WORK = english("refusedAtWork");
@@ -35,7 +40,7 @@ export class Connection {
         if (why !== undefined) return;
         navigator.serial.addEventListener("connect", ({ target }) => {
             if (this.#port && !this.#isOpen && (target === this.#port || isAlike(target, this.#port)))
-                void this.connect(target as SerialPort, true);
+                void this.#comeBack(target as SerialPort);
         });
         const update = new Update(parts, panel, async () => {
             if (panel.machine.isAtWork) {
@@ -50,7 +55,9 @@ export class Connection {
             if (happening.is === "connected") this.#say(() => `weeder ${happening.version}`);
             if (happening.is !== "lost" || !happening.forGood) return;
             this.#isOpen = false;
-            this.#say(() => "");
+            // Some ports are not there again for this page.
+            const isGone = happening.why === english("portGone");
+            this.#say(() => (isGone ? say("pressConnect", { connect: say("connect") }) : ""));
             this.#show();
         };
         // A hidden page has lost it.
@@ -64,6 +71,8 @@ export class Connection {
         if (this.#isBusy) return;
         this.#isBusy = true;
         await this.#attempt(async () => {
+            // A browser may give the same machine another port.
+            if (isBack && port !== this.#port) this.panel.mayBeOther = true;
             await this.disconnect();
             // Also where it does not open: its next cable is then noticed.
             this.#port = port;
@@ -76,6 +85,15 @@ export class Connection {
         });
         this.#isBusy = false;
         this.#show();
+    }
+
+    /** Connects a port whose cable is back, unless the operator has chosen another one meanwhile. */
+    async #comeBack(port: SerialPort): Promise<void> {
+        for (let tries = 0; tries < TRIES; tries++) {
+            await this.connect(port, true);
+            if (!this.#isOpen) await wait(AGAIN_MS);
+            if (this.#isOpen || this.#port !== port) return;
+        }
     }
 
     async disconnect(): Promise<void> {
@@ -100,6 +118,7 @@ export class Connection {
     }
 
     async #choose(): Promise<void> {
+        this.#say(() => "");
         const port = await choosePort();
         if (port) await this.connect(port);
         else this.#say(() => told(english("noPort")));
@@ -114,7 +133,8 @@ export class Connection {
     }
 
     #say(text: () => string): void {
-        this.parts.say("connection-said", text);
+        // The same text again would be read out again.
+        if (this.parts.html("connection-said").textContent !== plain(text())) this.parts.say("connection-said", text);
     }
 
     #show(): void {

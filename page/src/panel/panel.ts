@@ -4,7 +4,7 @@
 // types commands. It makes no decisions.
 
 import { download, Parts } from "../dom.ts";
-import type { EventLine } from "../link/console_line.ts";
+import type { EventLine, Setting } from "../link/console_line.ts";
 import { Log } from "../link/log.ts";
 import type { Allowed } from "../link/served.ts";
 import { type Ask, type Happening, isHold, type Link, NoMachine, NotSent } from "../link/session.ts";
@@ -37,6 +37,8 @@ const TABS = ["settings", "calibrate", "examples", "console"] as const;
 export class Panel {
     /** Called for each event, after the panel. */
     onHappening: (happening: Happening) => void = () => {};
+    /** Whether the next machine may be another than the last one. Its saved settings then show that. */
+    mayBeOther = false;
     readonly machine = new Machine();
     /** The row's name for a screen reader, if there are several. */
     readonly #row: string;
@@ -120,14 +122,12 @@ export class Panel {
 
     /**
      * Holds the machine, before all waiting commands. It is sent again until the machine has obeyed, also by the next
-     * connection.
+     * connection. Returns false if no machine was connected.
      */
-    hold(): void {
-        if (!this.#link) {
-            this.#parts.say("drive-said", () => sentence(told(english("noneConnected"))));
-            return;
-        }
-        void this.#holdNow().catch(() => {});
+    hold(): boolean {
+        if (this.#link) void this.#holdNow().catch(() => {});
+        else this.#parts.say("drive-said", () => sentence(told(english("noneConnected"))));
+        return this.#link !== undefined;
     }
 
     #holdNow(): Promise<void> {
@@ -174,6 +174,11 @@ export class Panel {
     /** Forgets what was measured at another machine, typed for it and said about it. */
     forget(): void {
         [this.machine.mode, this.machine.restarted] = [undefined, undefined];
+        this.#forgetTyped();
+    }
+
+    #forgetTyped(): void {
+        this.mayBeOther = false;
         this.#setUp.forget();
         this.#settings.forget();
         this.#parts.write("teach-said", "");
@@ -249,6 +254,10 @@ export class Panel {
 
     #take(happening: Happening): void {
         const { alarm, restarted } = this.machine;
+        if (happening.is === "connected") {
+            if (this.mayBeOther && !isSame(happening.settings, this.machine.settings)) this.#forgetTyped();
+            this.mayBeOther = false;
+        }
         this.machine.take(happening, this.#now);
         this.#signal(happening, this.machine.alarm !== alarm);
         if (this.machine.restarted !== undefined && this.machine.restarted !== restarted) signal("alarm");
@@ -345,6 +354,10 @@ export class Panel {
         choose("console");
     }
 }
+
+/** Whether a machine has saved what another one had. A machine without saved settings may be any. */
+const isSame = (settings: readonly Setting[], others: readonly Setting[]) =>
+    settings.every(({ saved }, at) => saved !== undefined && saved === others[at]?.saved);
 
 /** Whether an event is an alarm, also one that only a newer firmware knows. */
 function isAlarm(event: EventLine): boolean {

@@ -20,6 +20,7 @@ export const words = {
     loadIt: "Load it",
     twoBuilds:
         "This page's files are of two versions: its server is being updated, or the browser kept an old file. Load the page again in a minute.",
+    notStarted: "This page has not started: unpack the whole folder, and use a current browser.",
     unchecked: "",
 
     // Try.
@@ -90,6 +91,7 @@ export const words = {
     connectHint: "Connecting resets the Uno: its tool goes out. Connect before you work.",
     waitingForAnswer: "Waiting for its answer.",
     notConnected: "Not connected: {why}",
+    pressConnect: "If it does not connect by itself, press {connect}.",
     noMachinesList: "The machines cannot be asked for: {why}. Load the page again.",
     saveAndFlash: "Save the settings and flash",
     otherFirmware: "This Uno has weeder {theirs}, and this page has weeder {ours}.",
