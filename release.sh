@@ -122,8 +122,9 @@ avr-objcopy -O ihex -j .text "$inside/optiboot.elf" "$inside/optiboot.hex"
 "$weeder" hex --elf "$inside/weeder-firmware.elf" "$inside/weeder.hex"
 cmp "$inside/weeder.hex" "$folder/weeder.hex"
 
-# The page.
-[ -d page/node_modules ] || npm --prefix page ci --no-audit --no-fund
+# The page. Its packages are installed as in setup.sh.
+lock=page/node_modules/.package-lock.json
+if [ ! -e "$lock" ] || [ page/package-lock.json -nt "$lock" ]; then npm --prefix page ci --no-audit --no-fund; fi
 WEEDER="$weeder" npm --prefix page run build
 cp -r page/dist "$folder/page"
 cp -r page/dist "$inside/page"

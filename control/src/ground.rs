@@ -295,6 +295,17 @@ mod tests {
     }
 
     #[test]
+    fn the_spacing_counts_from_where_detection_began_again() {
+        for begin in [500, 2500, 4000] {
+            let (mut ground, _) = ground();
+            ground.roll_to(Position::new(3000));
+            ground.begin(Position::new(begin), false);
+            let canopy = pass(&mut ground, begin + 400, begin + 700);
+            assert_eq!(ground.spacing(&canopy), Length(400), "{begin}");
+        }
+    }
+
+    #[test]
     fn a_wheel_of_another_length_scale_forgets_and_closes_the_ground() {
         let (mut ground, mut settings) = ground();
         settings.set(Setting::TicksPerM, 15_000).expect("within its range");

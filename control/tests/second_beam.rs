@@ -123,7 +123,8 @@ fn an_insect_in_one_beam_is_no_alarm_and_half_a_plant_moves_nothing() {
     let mut rolling = with_beams(first, second).slipping(10.0);
     rolling.roll_to(5500.0, 500.0);
     assert_eq!(rolling.alarms(), []);
-    assert!(rolling.slips().iter().all(|slip| (94..=106).contains(slip)), "{:?}", rolling.slips());
+    let slips = rolling.slips();
+    assert!(slips.len() > 3 && slips.iter().all(|slip| (94..=106).contains(slip)), "{slips:?}");
 }
 
 #[test]

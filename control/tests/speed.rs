@@ -253,3 +253,15 @@ fn the_speed_of_a_silent_wheel_is_updated_at_each_eighth_of_the_silence_and_not_
     // From 10 to 500 ms there are 34 eighths; the last ones differ by less than a tick a second.
     assert!((20..=34).contains(&told), "{told} times");
 }
+
+#[test]
+fn a_start_after_a_stop_is_not_delayed_by_what_was_measured_before_it() {
+    for stands_ms in [600, 5000] {
+        let stands_s = stands_ms as f64 / 1000.0;
+        let mut run = Run::new();
+        run.roll(500, 200, |time| 1326.0 * time);
+        run.roll(stands_ms, 200, |_| 663.0);
+        run.roll(40, 200, |time| 663.0 + 1326.0 * (time - 0.5 - stands_s));
+        assert!((run.speed() - 1326.0).abs() < 60.0, "{} after {stands_ms} ms", run.speed());
+    }
+}

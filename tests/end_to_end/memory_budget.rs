@@ -12,8 +12,8 @@ use uno::elf::{Image, Size};
 use uno_run::firmware::workspace_root;
 
 /// The budgets, as in .ci/run.
-const FLASH_BYTES: u64 = 29_760;
-const SRAM_BYTES: u64 = 1100;
+const FLASH_BYTES: u64 = 29_950;
+const SRAM_BYTES: u64 = 1120;
 
 /// The stack's room at link time, by memory.x.
 const STACK_BYTES: usize = 768;

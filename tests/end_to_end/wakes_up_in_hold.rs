@@ -133,7 +133,7 @@ fn nothing_that_was_scheduled_survives_a_reset() {
         // From beam to tool, and the saved margin.
         assert!((460..=461).contains(&number(&after, "unseen_mm")), "{after}");
         let pulses = run.uno.pulses(wiring::SERVO);
-        let mut since = pulses.iter().filter(|pulse| pulse.rise > cycle);
-        assert!(since.all(|pulse| (pulse.width_us() - 2000.0).abs() < 0.1));
+        let since: Vec<_> = pulses.iter().filter(|pulse| pulse.rise > cycle).collect();
+        assert!(!since.is_empty() && since.iter().all(|pulse| (pulse.width_us() - 2000.0).abs() < 0.1));
     }
 }

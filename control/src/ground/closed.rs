@@ -1,11 +1,11 @@
 //! Closed ground: where the tool must be out.
 //!
 //! Ground is closed if no beam has seen it, or within the margin of a canopy. A detection without an end or a class and an
-//! expected plant count as canopies. One without an end may be narrow, so half of a stem zone is closed ahead of it. The tool must be out while closed ground lies within the leads. It must also be out while the
+//! expected plant count as canopies. One without an end has the stem zone that it would have if it ended here. The tool must be out while closed ground lies within the leads. It must also be out while the
 //! machine is so fast that a plant just behind the beam would reach it first.
 
 use super::{Ground, unclassified::Known};
-use crate::units::{Length, Position};
+use crate::units::{Length, Position, WrappedPosition};
 
 /// Why the tool may or may not work at its position. Only experiments read the reason; the machine needs yes or no.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,7 +40,7 @@ impl Ground {
     }
 
     /// Whether the machine is so fast that a plant just behind the beam reaches the tool before the tool is out. With a second
-    /// beam, a plant that only that beam sees must not reach it either, but may reach its margin.
+    /// beam, a plant that only that beam sees must not reach it either, but its zone may.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn outruns_the_beam(&self, tool_out: bool) -> bool {
         let out = self.leads.out;
@@ -59,10 +59,17 @@ impl Ground {
         let reaches = |leading| far - leading >= -margin;
         self.keep_out.is_closed(near, far, margin)
             // Both: a detection of the second beam lies ahead of a wide one that is open in the first.
-            || self.unclassified.known == Known::Canopy && reaches(self.unclassified.canopy.leading)
-            || self.detector.open().is_some_and(|leading| reaches(leading - self.geometry.beyond_canopy()))
+            || self.unclassified.known == Known::Canopy && reaches(self.unclassified.canopy.from_unclassified())
+            || self.detector.open().is_some_and(|leading| reaches(self.zone_of_open(leading)))
             || self.guard.awaited(self.detector.frontier(), &self.geometry).is_some_and(reaches)
             || self.second_beam.open_alone().is_some_and(reaches)
+    }
+
+    /// Where the zone of the open detection begins: at its leading edge, or ahead of it while it is narrower than the stem zone.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
+    fn zone_of_open(&self, leading: WrappedPosition) -> WrappedPosition {
+        let wider = self.geometry.stem_zone() - (self.detector.open_to() - leading);
+        leading - Length(wider.max(Length::ZERO).0 / 2)
     }
 
     /// Why the tool is in or out at its position, if the odometer shows `position`.

@@ -49,7 +49,7 @@ impl Guard {
         }
         self.left -= 1;
         self.due = due + geometry.guard_spacing();
-        Some(Canopy { leading: due - guarded, trailing: due + guarded, trim: 0 })
+        Some(Canopy { leading: due - guarded, trailing: due + guarded, trim: Length::ZERO })
     }
 
     /// Where the stretch of an expected plant begins, if the beam has reached it.

@@ -34,34 +34,44 @@ pub struct Canopy {
     pub leading: WrappedPosition,
     /// Where it ends.
     pub trailing: WrappedPosition,
-    /// Width of the leaves on either side under which the tool may work; 0 keeps the full width.
-    pub trim: u8,
+    /// Width of the leaves on either side under which the tool may work. Below 0, so far the stem zone reaches beyond either end.
+    pub trim: Length,
 }
 
 impl Canopy {
     /// No canopy.
-    pub(super) const NONE: Self = Self { leading: WrappedPosition::new(0), trailing: WrappedPosition::new(0), trim: 0 };
+    pub(super) const NONE: Self =
+        Self { leading: WrappedPosition::new(0), trailing: WrappedPosition::new(0), trim: Length::ZERO };
 
     /// The canopy of a detection, if it is a plant, and `zone` around its middle. Leaves beside the zone are kept too, unless it
     /// `is_single`.
     pub(super) fn of(detection: &Detection, zone: Length, is_single: bool) -> Self {
-        let trim = trim(detection.width(), zone);
-        let beyond = trim.min(Length::ZERO);
-        Self {
-            leading: detection.leading + beyond,
-            trailing: detection.trailing - beyond,
-            trim: if is_single { trim.max(Length::ZERO).0 as u8 } else { 0 },
+        let mut canopy =
+            Self { leading: detection.leading, trailing: detection.trailing, trim: trim(detection.width(), zone) };
+        if !is_single {
+            canopy.keep_leaves();
         }
+        canopy
+    }
+
+    /// Keeps all leaves.
+    pub(super) fn keep_leaves(&mut self) {
+        self.trim = self.trim.min(Length::ZERO);
+    }
+
+    /// Where the tool has to be out, without the margin, until the detection is classified: leaves beside the zone count.
+    pub(super) fn from_unclassified(&self) -> WrappedPosition {
+        self.leading + self.trim.min(Length::ZERO)
     }
 
     /// Where the tool has to be out, without the margin.
     fn from(&self) -> WrappedPosition {
-        self.leading + Length(self.trim.into())
+        self.leading + self.trim
     }
 
     /// Where the tool may come back, without the margin.
     fn to(&self) -> WrappedPosition {
-        self.trailing - Length(self.trim.into())
+        self.trailing - self.trim
     }
 
     /// Takes a stretch that the second beam sees, all of a detection or one end. Returns whether it lies within `reach` of the
@@ -83,7 +93,7 @@ impl Canopy {
             self.trailing = to;
         }
         if before.max(behind) > Length(within.0 >> 2) {
-            self.trim = 0;
+            self.keep_leaves();
         }
         true
     }
@@ -128,7 +138,7 @@ impl KeepOut {
         self.has_dropped = has_dropped;
     }
 
-    /// Declares the ground known from `position` on. `position` lies behind the frontier.
+    /// Declares the ground known from `position` on.
     pub fn set_known_from(&mut self, position: WrappedPosition) {
         (self.known_from, self.has_dropped) = (position, false);
     }
@@ -145,12 +155,11 @@ impl KeepOut {
     /// [`ScheduleFull`] if even the oldest zone lies at the tool or ahead of it. The canopy is then not added.
     pub fn push(&mut self, canopy: &Canopy, tool: WrappedPosition, margin: Length) -> Result<(), ScheduleFull> {
         if self.canopies.is_full() {
-            let oldest = self.canopies.first().ok_or(ScheduleFull)?;
-            if !tool.is_ahead_of(oldest.trailing + margin) {
+            let end = self.canopies.first().ok_or(ScheduleFull)?.to();
+            if !tool.is_ahead_of(end + margin) {
                 return Err(ScheduleFull);
             }
-            let position = oldest.trailing;
-            self.leave(position);
+            self.leave(end);
         }
         self.canopies.push(*canopy).map_err(|_| ScheduleFull)
     }
@@ -179,7 +188,7 @@ impl KeepOut {
         }
         // They are in order, so only the first can lie behind. If the second does too, the next turn drops it: until then the unknown
         // ground covers it.
-        if self.canopies.first().is_some_and(|canopy| !canopy.trailing.is_ahead_of(self.known_from)) {
+        if self.canopies.first().is_some_and(|canopy| !canopy.to().is_ahead_of(self.known_from)) {
             self.canopies.remove(0);
         }
     }
@@ -207,7 +216,7 @@ impl KeepOut {
 
     /// Zones at the tool or ahead of it.
     pub fn ahead(&self, tool: WrappedPosition, margin: Length) -> u8 {
-        self.canopies.iter().map(|canopy| u8::from(!(tool - margin).is_ahead_of(canopy.trailing))).sum()
+        self.canopies.iter().map(|canopy| u8::from(!(tool - margin).is_ahead_of(canopy.to()))).sum()
     }
 }
 
@@ -254,7 +263,7 @@ mod tests {
     }
 
     fn canopy(leading: i16, trailing: i16) -> Canopy {
-        Canopy { leading: at(leading), trailing: at(trailing), trim: 0 }
+        Canopy { leading: at(leading), trailing: at(trailing), trim: Length::ZERO }
     }
 
     fn closed(keep_out: &KeepOut, from: i16, to: i16) -> bool {
@@ -266,7 +275,9 @@ mod tests {
         for base in [0, i16::MAX - 1100] {
             let at = |offset: i16| at(base.wrapping_add(offset));
             let mut keep_out = KeepOut::new(at(-1000));
-            keep_out.push(&Canopy { leading: at(1000), trailing: at(1300), trim: 0 }, at(0), MARGIN).unwrap();
+            keep_out
+                .push(&Canopy { leading: at(1000), trailing: at(1300), trim: Length::ZERO }, at(0), MARGIN)
+                .unwrap();
             for (from, to, closed) in [
                 (904, 904, false),
                 (905, 905, true),
@@ -286,7 +297,7 @@ mod tests {
     fn a_single_plant_is_closed_in_its_stem_zone_and_margins() {
         let zone = Length(160);
         for (width, trim) in [(160, 0), (170, 5), (213, 26), (214, 27), (215, 27), (300, 27)] {
-            assert_eq!(Canopy::of(&Detection::whole(1000, 1000 + width), zone, true).trim, trim, "{width}");
+            assert_eq!(Canopy::of(&Detection::whole(1000, 1000 + width), zone, true).trim, Length(trim), "{width}");
         }
         let plant = Detection::whole(1000, 1300);
         for (zone, is_single) in [(Length::ZERO, true), (zone, false)] {
@@ -303,10 +314,18 @@ mod tests {
         for (width, from, to) in [(0, 920, 1080), (60, 950, 1110), (99, 969, 1130), (159, 999, 1160), (160, 1000, 1160)]
         {
             for is_single in [true, false] {
-                let zone = Canopy::of(&Detection::whole(1000, 1000 + width), Length(160), is_single);
-                assert_eq!(zone, canopy(from, to), "{width}");
+                let plant = Canopy::of(&Detection::whole(1000, 1000 + width), Length(160), is_single);
+                assert_eq!((plant.from(), plant.to()), (at(from), at(to)), "{width}");
+                assert_eq!(plant.from_unclassified(), at(from), "{width}");
             }
         }
+    }
+
+    #[test]
+    fn the_second_beam_widens_a_narrow_canopy_by_what_the_first_has_missed() {
+        let mut plant = Canopy::of(&Detection::whole(1000, 1060), Length(160), true);
+        assert!(plant.widen(at(970), at(1060), Length(100), Length(100)));
+        assert_eq!((plant.from(), plant.to()), (at(920), at(1110)));
     }
 
     #[test]

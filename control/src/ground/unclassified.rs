@@ -68,7 +68,7 @@ impl Ground {
         }
         // An unknown detection may be several plants: it keeps its full width.
         if class != Class::Plant {
-            canopy.trim = 0;
+            canopy.keep_leaves();
         }
         self.guard.see(detection, &self.geometry);
         self.keep_out.push(&self.unclassified.canopy, self.tool(), self.geometry.margin())

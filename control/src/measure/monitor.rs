@@ -379,6 +379,32 @@ mod tests {
     use super::*;
 
     #[test]
+    fn eight_short_breaks_in_a_row_are_the_beam_s_fault_and_one_of_8_ms_counts_as_four() {
+        let explained = |breaks_ms: &[u32]| {
+            let (mut monitor, mut ms) = (BeamMonitor::NONE, 1000);
+            for length_ms in breaks_ms {
+                monitor.edge(Coarse::at_ms(ms), true);
+                monitor.edge(Coarse::at_ms(ms + length_ms), false);
+                ms += 500;
+            }
+            monitor.explain(Alarm::CropUnknown, Coarse::at_ms(ms))
+        };
+        for (breaks_ms, is_fault) in [
+            (&[30; 8][..], true),
+            (&[30; 7], false),
+            (&[32; 20], false),
+            (&[8, 8], true),
+            (&[9; 7], false),
+            (&[30, 30, 30, 30, 8], true),
+            (&[30, 30, 30, 8], false),
+            (&[8, 8, 40], false),
+        ] {
+            let alarm = if is_fault { Alarm::BeamFlickers } else { Alarm::CropUnknown };
+            assert_eq!(explained(breaks_ms), alarm, "{breaks_ms:?}");
+        }
+    }
+
+    #[test]
     fn a_time_may_be_off_by_a_turn_or_a_millisecond() {
         assert_eq!([0, 3, 4, 5, 200].map(grace), [4, 4, 5, 6, 201]);
     }

@@ -140,4 +140,28 @@ mod tests {
         tool.order(4000, at(300.0));
         assert!(!tool.has_held(4000, at(300.0), 600) && tool.has_held(4000, at(301.0), 600));
     }
+
+    #[test]
+    fn only_swings_out_that_last_count_as_not_followed_and_a_followed_one_ends_the_run() {
+        let at = |ms: u32| Instant::at_ms(ms).slow();
+        for (lasts_ms, followed_at, stuck) in [(200, None, false), (300, None, true), (300, Some(2), false)] {
+            let mut tool = Tool::NONE;
+            tool.init(Slow::ZERO);
+            for swing in 0..4_u32 {
+                let begin = 1000 * swing;
+                tool.send(true, false);
+                tool.order(4000, at(begin));
+                if swing < 3 || followed_at.is_none() {
+                    tool.end_swing(at(begin + lasts_ms), 270, followed_at == Some(swing));
+                }
+                tool.send(false, false);
+                tool.order(3000, at(begin + lasts_ms));
+                tool.end_swing(at(begin + 900), 270, false);
+                if tool.follows_no_swing() {
+                    break;
+                }
+            }
+            assert_eq!(tool.follows_no_swing(), stuck, "{lasts_ms} ms, {followed_at:?}");
+        }
+    }
 }

@@ -171,3 +171,18 @@ fn a_long_distance_without_a_plant_is_one_warning() {
     never.roll(1.3, 150.0);
     assert!(!never.machine.sees_no_plants());
 }
+
+#[test]
+fn start_ends_the_warning_and_counts_the_distance_anew() {
+    let mut drive = Drive::at_work();
+    drive.machine.set(Setting::NoPlantM, 2).unwrap();
+    drive.roll(0.5, 3.0);
+    assert!(drive.machine.sees_no_plants());
+    drive.machine.hold();
+    drive.machine.start(false).unwrap();
+    assert!(!drive.machine.sees_no_plants());
+    drive.roll(0.5, 1.9);
+    assert!(!drive.machine.sees_no_plants());
+    drive.roll(0.5, 0.2);
+    assert!(drive.machine.sees_no_plants());
+}

@@ -38,7 +38,7 @@ fn after_a_sudden_silence_the_tool_is_out_until_ground_seen_since_reaches_it() {
         }
         drive.roll(0.5, 0.05);
         assert!(drive.tool_is_in(), "{speed_m_s} m/s");
-        assert_eq!(drive.alarm(), None);
+        assert_eq!((drive.alarm(), drive.machine.late()), (None, 0));
     }
 }
 

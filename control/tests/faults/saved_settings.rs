@@ -83,3 +83,13 @@ fn saved_settings_that_contradict_each_other_are_an_alarm_and_do_not_start() {
     machine.set(Setting::BeamToToolMm, 400).unwrap();
     assert_eq!(machine.start(false), Ok(()));
 }
+
+#[test]
+fn with_both_copies_changed_no_older_settings_are_told() {
+    let mut memory = saved(&Settings::new());
+    memory.bytes[20] ^= 4;
+    memory.bytes[SIZE / 2 + 20] ^= 4;
+    let mut machine = Rig::wake(ByWidth::new(LEAST_HOLD_MM, 0), memory, Cause::PowerOn);
+    assert_eq!(machine.state(), State::Alarm(Alarm::SettingsLost));
+    assert_eq!((machine.present_warning(), machine.events()), (None, vec![]));
+}

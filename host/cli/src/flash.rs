@@ -51,7 +51,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     // These checks come before the build, and their errors say more than avrdude's.
     link::try_port(&port)?;
     let claim = link::claim(&port)?;
-    if let (Board::Only { .. }, Some(converter)) = (&board, link::converter_at(&port)) {
+    let converter = link::converter_at(&port);
+    if let (Board::Only { .. }, Some(converter)) = (&board, converter) {
         let heard = [bootloader, other].map(|bootloader| heard(&claim, &port, bootloader.baud));
         ensure!(
             heard.iter().any(|heard| matches!(heard, Ok(Heard::Bootloader(_)))),
@@ -61,7 +62,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     let elf = arguments.firmware.elf()?;
     let flash = Image::read(&elf)?.flash;
-    check_room(flash.len(), bootloader.available)?;
+    check_room(flash.len(), room(bootloader, converter))?;
     arguments.firmware.check(&elf)?;
     say!("Writing {} to the Uno at {port}", elf.display())?;
     say!(
@@ -77,6 +78,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let (succeeded, signature) = avrdude::write(&flash, &port, bootloader.baud)?;
     ensure!(succeeded, "avrdude did not succeed: {}", why(&claim, &port, bootloader, other, signature));
     say!("Done: the Uno runs it. `weeder monitor --port {}` talks to it.", shlex::try_quote(&port)?)
+}
+
+/// Bytes of flash for the firmware on a board with this converter. A Nano with optiboot reserves 2048 bytes as for the
+/// old bootloader (boards.txt of Arduino's AVR core): after a reset it runs from 0x7800 on. Its USB number does not tell
+/// it from an Uno's copy.
+fn room(bootloader: Bootloader, converter: Option<&str>) -> usize {
+    if converter.is_some() { OLD.available } else { bootloader.available }
 }
 
 /// Seconds from the reset until the firmware starts: the bytes go to the Uno and back, a page takes 5 ms to write, and
@@ -140,5 +148,11 @@ mod tests {
     fn the_time_without_a_signal_counts_both_ways_at_either_rate() {
         // 29,400 bytes both ways take 5.1 s at 115200 baud and 10.2 at 57600, and 230 pages 1.2 s.
         assert_eq!([OPTIBOOT, OLD].map(|bootloader| seconds(29_400, bootloader.baud)), [9, 14]);
+    }
+
+    #[test]
+    fn a_board_that_may_be_a_nano_has_2_kib_less_than_the_chip() {
+        assert_eq!([None, Some("CH340")].map(|converter| room(OPTIBOOT, converter)), [32_256, 30_720]);
+        assert_eq!([None, Some("FT232R")].map(|converter| room(OLD, converter)), [30_720; 2]);
     }
 }

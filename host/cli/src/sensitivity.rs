@@ -6,14 +6,14 @@ use clap::Args;
 use comfy_table::CellAlignment;
 use field::conditions::{self, Conditions, PARAMETERS};
 use field::tool_path::Effect;
-use frame::{number_within, say, source, whole_within, with_bar};
+use frame::{number_within, say, source, tell, whole_within, with_bar};
 use link::settings::Setting;
 use std::collections::HashSet;
 use std::str::FromStr;
 use study::experiment::{ControllerKind, Engine, Experiment, totals};
 use study::statistics::Share;
 use study::sweep::{SPACINGS_CM, SPEEDS_KM_H};
-use study::table::{distinct, optional, visible};
+use study::table::{NOTHING, distinct, optional, visible};
 use uno_run::report::number_table;
 
 /// The default changes. The guard is for the default spacing.
@@ -96,9 +96,8 @@ impl Change {
         };
         let of_field = |name: &str| {
             let parameter = field.values().find(|(known, _)| known.name == name).map(|(_, value)| value);
-            let set = || field.settings.get(name).map(|&value| f64::from(value));
-            let default = || Setting::find(name.as_bytes()).map(|setting| f64::from(setting.default()));
-            parameter.or_else(set).or_else(default).map_or_else(String::new, |value| written(name, value))
+            let value = parameter.or_else(|| setting(field, name));
+            value.map_or_else(|| NOTHING.to_owned(), |value| written(name, value))
         };
         [
             lines(&|name, _| name.to_owned()),
@@ -106,6 +105,38 @@ impl Change {
             lines(&|name, _| of_field(name)),
         ]
     }
+}
+
+/// The firmware's setting in a field: the field's own, the machine's distance, or the default. `None` if it follows from
+/// the speed.
+fn setting(field: &Conditions, name: &str) -> Option<f64> {
+    let own = field.settings.get(name).map(|&value| f64::from(value));
+    own.or(match Setting::find(name.as_bytes())? {
+        Setting::BeamToToolMm => Some(field.machine.beam_to_tool_mm.round()),
+        Setting::SecondBeamMm => Some(field.machine.second_beam_mm.round()),
+        Setting::TopSpeedMmS => None,
+        other => Some(other.default().into()),
+    })
+}
+
+/// What is likely wrong with the changed fields, each once, and not with the field itself.
+fn warnings(field: &Conditions, changed: &[Experiment]) -> Vec<String> {
+    let mut known: Vec<String> = field.warning().into_iter().collect();
+    let of_field = known.len();
+    for warning in changed.iter().filter_map(|experiment| experiment.conditions.warning()) {
+        if !known.contains(&warning) {
+            known.push(warning);
+        }
+    }
+    known.split_off(of_field)
+}
+
+/// The rows of each line. Changes may change their number or their length.
+fn rows(changed: &[Experiment]) -> String {
+    let of = |experiment: &Experiment| (experiment.rows(), experiment.conditions.plot.row_m);
+    let Some((count, row_m)) = changed.first().map(of) else { return String::new() };
+    let lines = if changed.iter().all(|other| of(other) == (count, row_m)) { "a line" } else { "in the first line" };
+    format!("{count} rows of {row_m} m {lines}")
 }
 
 /// Runs it and prints the table.
@@ -129,6 +160,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Ok(Experiment { conditions, ..experiment.clone() })
     });
     let changed = changed.collect::<Result<Vec<Experiment>>>()?;
+    warnings(&conditions, &changed).iter().for_each(|warning| tell!("Warning: {warning}"));
     let header = ["assumption", "here", "in the\nfield"].map(str::to_owned).into_iter();
     let weeded = speeds.iter().map(|speed| format!("weeded\nat {speed}\nkm/h\nin %"));
     let damaged =
@@ -161,11 +193,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         }
         anyhow::Ok(())
     })?;
-    let rows = experiment.rows();
-    say!(
-        "{table}\nField {field}, seed {seed}: {rows} rows of {} m a line, plants {spacing} cm apart.",
-        conditions.plot.row_m
-    )
+    say!("{table}\nField {field}, seed {seed}: {}, plants {spacing} cm apart.", rows(&changed))
 }
 
 #[cfg(test)]
@@ -182,6 +210,41 @@ mod tests {
                 changed.set(name, *value).expect("it is in its range");
             }
             assert_ne!(changed, field, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_setting_that_follows_from_the_machine_has_its_value_in_the_field() {
+        let mut field = Conditions::default();
+        for (name, value) in [("machine.beam_to_tool_mm", 600.0), ("machine.second_beam_mm", 200.0), ("k", 5.0)] {
+            field.set(name, value).expect("it is in its range");
+        }
+        let text = "beam_to_tool_mm=500,second_beam_mm=0,top_speed_mm_s=900,k=3,merge_gap_mm=1,machine.arm=trailing";
+        let change: Change = text.parse().expect("it is a change");
+        let [_, here, of_field] = change.cells(&field);
+        assert_eq!(here, "500\n0\n900\n3\n1\ntrailing");
+        assert_eq!(of_field, "600\n200\n\u{2013}\n5\n21\npendulum");
+    }
+
+    #[test]
+    fn a_changed_field_has_its_own_warning_and_number_of_rows() {
+        let field = Conditions::default();
+        let with = |name, value| {
+            let mut conditions = field.clone();
+            conditions.set(name, value).expect("it is in its range");
+            Experiment::as_in_the_paper(conditions, 1)
+        };
+        let [unchanged, wide] = [("crop.canopy_mm", 150.0), ("crop.canopy_mm", 160.0)].map(|(name, mm)| with(name, mm));
+        assert_eq!(warnings(&field, &[unchanged.clone(), wide.clone()]), [""; 0]);
+        let other = with("beam_to_tool_mm", 500.0);
+        let told = warnings(&field, &[unchanged.clone(), other.clone(), other.clone()]);
+        let said = "settings.beam_to_tool_mm is 500, but the simulated machine has 400.";
+        assert!(told.len() == 1 && told[0].starts_with(said), "{told:?}");
+        assert_eq!(warnings(&other.conditions, std::slice::from_ref(&other)), [""; 0]);
+        let (count, row_m) = (unchanged.rows(), field.plot.row_m);
+        assert_eq!(rows(&[unchanged.clone(), wide]), format!("{count} rows of {row_m} m a line"));
+        for size in [with("plot.rows", 2.0), with("plot.row_m", 7.0)] {
+            assert_eq!(rows(&[unchanged.clone(), size]), format!("{count} rows of {row_m} m in the first line"));
         }
     }
 

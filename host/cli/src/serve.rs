@@ -5,9 +5,9 @@ use crate::inside::INSIDE;
 use crate::ports::Ports;
 use anyhow::Result;
 use clap::Args;
-use frame::{say, tell, whole_within};
+use frame::{say, teller, whole_within};
 use serve::page::Page;
-use serve::{Server, Setup};
+use serve::{Server, Setup, Tell};
 use std::env;
 use std::net::Ipv4Addr;
 use std::path::PathBuf;
@@ -61,13 +61,15 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     };
     let lan = arguments.lan.map(|address| address.map_or_else(serve::find_lan, Ok)).transpose()?;
     let chosen = arguments.ports.choose(None)?;
+    // A stopped terminal delays no HOLD.
+    let tell: Tell = Arc::new(teller());
     let server = Server::open(Setup {
         machines: chosen.names().into_iter().zip(chosen.openers()).collect(),
         page,
         port: arguments.http_port,
         lan,
         may_start: arguments.allow_start,
-        tell: Arc::new(|line| tell!("{line}")),
+        tell: Arc::clone(&tell),
     })?;
     let stop = ctrl_c()?;
     say!("http://{}/ is the page, for this computer alone.", server.here())?;
@@ -76,13 +78,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         say!("The code, where it is asked for: {}", code.spelled())?;
     }
     if arguments.open {
-        open_in_browser(&format!("http://{}/", server.here()));
+        open_in_browser(&format!("http://{}/", server.here()), &tell);
     }
     server.run(&stop);
     Ok(())
 }
 
-fn open_in_browser(address: &str) {
+fn open_in_browser(address: &str, tell: &Tell) {
     let mut words = match env::consts::OS {
         "macos" => vec!["open"],
         "windows" => vec!["cmd", "/C", "start"],
@@ -92,6 +94,6 @@ fn open_in_browser(address: &str) {
     // The program may run until the browser ends.
     let opened = Command::new(words[0]).args(&words[1..]).stdin(Stdio::null()).stdout(Stdio::null()).spawn();
     if let Err(error) = opened {
-        tell!("No browser can be opened from here ({}: {error}): open the address by hand.", words[0]);
+        tell(&format!("No browser can be opened from here ({}: {error}): open the address by hand.", words[0]));
     }
 }

@@ -60,10 +60,11 @@ pub struct Arguments {
 
 /// The measures from which `weeder design` calculates the stroke: the key in a machine file, and the question.
 const TOOL_WIDTH: &str = "intra_row.width";
-const ASKED: [(&str, &str); 11] = [
+const ASKED: [(&str, &str); 12] = [
     (TOOL_WIDTH, "The tool's width"),
     ("intra_row.shank_length", "The arm's length, from the servo's axis to the blade's tip"),
     ("intra_row.shank_diameter", "The arm's diameter, as that of a steel rod of its weight"),
+    ("intra_row.blade_base", "The blade's length along the row"),
     ("intra_row.blade_height", "The blade's height"),
     ("intra_row.blade_mass", "The blade's mass, with its clamp"),
     ("intra_row.servo_torque", "The servo's greatest torque"),
@@ -71,7 +72,7 @@ const ASKED: [(&str, &str); 11] = [
     ("swing.pulse_for_90", "The pulse's change in us for 90 degrees: 1000 for most, 667 for servos of 270 degrees"),
     ("swing.protected", "The width round a stem that no tool may enter"),
     ("swing.stem_off", "How far a stem may stand off the middle of its canopy"),
-    ("swing.room", "Room beside the stem zone, for plants off the line and a machine that strays"),
+    ("swing.room", "Room beside the stem zone: plants off the line, a machine that strays, play at the tip"),
 ];
 
 /// Leads through the steps.
@@ -243,7 +244,8 @@ impl Guide {
         }
         let width_mm = self.tool_width_mm().context("the tool's width was not given in step 3");
         let machine = width_mm.and_then(|_| self.machine.map_or_else(|| asked(&self.state), Ok));
-        let expected = machine.and_then(|machine| simulated::expected(&settings, &machine));
+        let stroke_ms = self.state.measured.stroke_ms(&settings);
+        let expected = machine.and_then(|machine| simulated::expected(&settings, &machine, stroke_ms));
         say!("  Expected: {}", expected.unwrap_or_else(|error| format!("not calculated, because {error:#}")))?;
         say!("  The measurements are in {}.", self.path.display())?;
         say!("  Next, read docs/work.md (in a release: manual/docs/work.md).")
@@ -475,11 +477,12 @@ fn asked(state: &State) -> Result<Machine> {
     Ok(mechanics::file::parse(Path::new("the machine"), &text)?)
 }
 
-/// Calculates leads and margin with a machine's arm.
+/// Calculates leads and margin with a machine's arm and blade.
 fn take_arm(measured: &mut SetUp, machine: &Machine) {
     let tool_mm = MM.value(machine.intra_row.width).ceil() as u16;
     measured.trailing_tool_mm = (machine.swing.arm_trails > 0).then_some(tool_mm);
     let length_mm = MM.value(machine.intra_row.shank_length);
     let ms_for_90 = 1500.0 * SECOND.value(machine.swing.servo_time_60);
-    measured.arm = Arm { length_mm, us_for_90: machine.swing.pulse_for_90, ms_for_90 };
+    let blade_length_mm = MM.value(machine.intra_row.blade_base);
+    measured.arm = Arm { length_mm, us_for_90: machine.swing.pulse_for_90, ms_for_90, blade_length_mm };
 }

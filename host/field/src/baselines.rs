@@ -105,9 +105,12 @@ pub fn ideal(pass: &Pass, stems: &[Stem]) -> Weeded {
             Some(Reason { times_s: passed_s(zone.start)?..passed_s(zone.end)?, part: Part::Plants })
         }),
     );
+    let half_mm = machine.half_length_mm();
     let windows: Vec<Range<f64>> = zones
         .into_iter()
-        .filter_map(|zone| Some(passed_s(zone.start)? - slowest_s..passed_s(zone.end)? - quickest_s))
+        .filter_map(|zone| {
+            Some(passed_s(zone.start - half_mm)? - slowest_s..passed_s(zone.end + half_mm)? - quickest_s)
+        })
         .collect();
     // If there is no time to swing in and out again, the tool stays out.
     let swings_s = union(windows.into_iter().map(|window| window.start..window.end + slowest_s).collect());

@@ -25,6 +25,13 @@ pub fn share_of(row: &Range<f64>, union: &[Range<f64>]) -> f64 {
     covered / (row.end - row.start)
 }
 
+/// The parts of `whole` between the stretches of a union.
+pub(crate) fn between(union: &[Range<f64>], whole: &Range<f64>) -> Vec<Range<f64>> {
+    let starts = std::iter::once(whole.start).chain(union.iter().map(|stretch| stretch.end));
+    let ends = union.iter().map(|stretch| stretch.start).chain([whole.end]);
+    starts.zip(ends).map(|(start, end)| start..end).filter(|stretch| stretch.start < stretch.end).collect()
+}
+
 /// The spans between these ends, in any order, over whose middle a condition holds.
 pub(crate) fn spans_where(mut ends: Vec<f64>, holds_at: impl Fn(f64) -> bool) -> Vec<Range<f64>> {
     ends.sort_by(f64::total_cmp);

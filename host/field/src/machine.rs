@@ -8,7 +8,7 @@
 //! At an angle `a` of its arm the tool's middle is `arm * sin(a)` beside the row's line. So the tool works the line while
 //! that is less than half its width. It is *clear* of the row only when it is fully out. The arm is a pendulum, which
 //! lifts the tool by `arm * (1 - cos(a))`, or it trails behind its pivot and carries the tool forward by as much. The
-//! tool stays square to the row.
+//! tool stays square to the row. It is a rectangle: its length along the row is half ahead of its middle, half behind.
 //!
 //! The encoder has no jitter. If its disc is dirty, pulses of its channel A are missing.
 
@@ -32,7 +32,7 @@ pub struct Machine {
     pub wheel_mm: f64,
     /// Encoder counts (edges of both channels) in a turn of the wheel.
     pub ticks_per_rev: u32,
-    /// Distance from the beam back to the tool: the paper's X.
+    /// Distance from the beam back to the tool's middle along the row: the paper's X.
     pub beam_to_tool_mm: f64,
     /// Distance from the beam back to a second one; 0 if there is none.
     pub second_beam_mm: f64,
@@ -48,6 +48,8 @@ pub struct Machine {
     pub arm: Arm,
     /// Width of the tool, across the row.
     pub tool_width_mm: f64,
+    /// Length of the tool, along the row; 0 is a line across it.
+    pub tool_length_mm: f64,
     /// An arm within this angle of fully out is fully out.
     pub clear_within_degrees: f64,
     /// Dirt on the encoder's disc.
@@ -89,6 +91,7 @@ impl Default for Machine {
             arm_mm: 350.0,
             arm: Arm::Pendulum,
             tool_width_mm: 55.0,
+            tool_length_mm: 0.0,
             // A tenth of a millimetre at the tool's end.
             clear_within_degrees: 0.02,
             dirt: Dirt::default(),
@@ -102,12 +105,12 @@ impl Machine {
         PI * self.wheel_mm / f64::from(self.ticks_per_rev)
     }
 
-    /// Ground under the tool when the machine is at `position_mm`.
+    /// Ground under the tool's middle when the machine is at `position_mm`.
     pub fn tool_mm(&self, position_mm: f64) -> f64 {
         position_mm - self.beam_to_tool_mm
     }
 
-    /// The stretch of ground that the tool rolls over during a time.
+    /// The stretch of ground that the tool's middle rolls over during a time.
     pub fn worked_mm(&self, motion: &Motion, times_s: &Range<f64>) -> Range<f64> {
         let stretch = motion.stretch_mm(times_s);
         self.tool_mm(stretch.start)..self.tool_mm(stretch.end)
@@ -145,6 +148,11 @@ impl Machine {
     /// The angle beyond which the tool no longer works the row's line.
     pub fn line_degrees(&self) -> f64 {
         (self.tool_width_mm / 2.0 / self.arm_mm).min(1.0).asin().to_degrees()
+    }
+
+    /// Half of the tool's length: how far it reaches ahead of its middle, and behind it.
+    pub fn half_length_mm(&self) -> f64 {
+        self.tool_length_mm / 2.0
     }
 
     /// How far from the row's line the tool's nearer edge is when it is fully out.

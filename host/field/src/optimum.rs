@@ -23,17 +23,17 @@ const STEP_MM: f64 = 1.0;
 
 /// The share of the row's ground, from 0 to 1, that can be weeded at most without the tool touching the zone round a stem.
 pub fn undamaged_share(stand: &Stand, machine: &Machine, motion: &Motion, steering: &Steering) -> f64 {
-    let half_mm = machine.tool_width_mm / 2.0;
+    let (half_mm, half_length_mm) = (machine.tool_width_mm / 2.0, machine.half_length_mm());
     let degrees_a_s = OUT_DEGREES / (machine.servo.travel_ms / 1000.0);
     let line_degrees = machine.line_degrees();
     let mut lost = Vec::new();
     for stem in &stand.stems {
         let mut before: Option<Range<f64>> = None;
-        let steps = (2.0 * stem.protected_mm / STEP_MM).ceil() as u32;
+        let reach_mm = stem.protected_mm + half_length_mm;
+        let steps = (2.0 * reach_mm / STEP_MM).ceil() as u32;
         for step in 1..steps {
-            let place_mm = stem.along_mm - stem.protected_mm + f64::from(step) * STEP_MM;
-            let beside_mm = place_mm - stem.along_mm;
-            let chord_mm = stem.half_chord_mm(beside_mm);
+            let place_mm = stem.along_mm - reach_mm + f64::from(step) * STEP_MM;
+            let chord_mm = stem.half_chord_beside_mm(place_mm - stem.along_mm, half_length_mm);
             let across_mm = stem.across_mm - steering.tool_across_mm(place_mm);
             // A tool in the row that passes to the right of the zone, or to the left of one on the far side.
             if half_mm <= across_mm - chord_mm || across_mm + chord_mm <= -half_mm {
@@ -53,7 +53,9 @@ pub fn undamaged_share(stand: &Stand, machine: &Machine, motion: &Motion, steeri
             }
         }
     }
-    1.0 - share_of(&stand.span_mm, &union(lost))
+    // The tool also weeds half of its length beyond its middle.
+    let left = union(lost).into_iter().map(|lost| lost.start + half_length_mm..lost.end - half_length_mm);
+    1.0 - share_of(&stand.span_mm, &left.filter(|left| left.start < left.end).collect::<Vec<_>>())
 }
 
 #[cfg(test)]

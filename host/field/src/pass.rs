@@ -106,7 +106,12 @@ impl Pass {
     /// the tool before the tool is out.
     pub fn too_fast_mm_s(&self) -> f64 {
         let Machine { beam_to_tool_mm, second_beam_mm, .. } = self.machine;
-        (beam_to_tool_mm - second_beam_mm.max(self.timing.margin_mm.into())) / self.notice_s()
+        (beam_to_tool_mm - second_beam_mm.max(self.before_plant_mm())) / self.notice_s()
+    }
+
+    /// Ground that the firmware keeps clear ahead of a plant just behind the beam: the margin, and half of a stem zone.
+    fn before_plant_mm(&self) -> f64 {
+        f64::from(self.timing.margin_mm + self.timing.stem_zone_mm / 2)
     }
 
     /// The firmware's settings, in an order without intermediate contradictions. Further settings replace those of the
@@ -116,7 +121,7 @@ impl Pass {
         let ZoneSettings { margin_mm, lead_out_ms, lead_in_ms, .. } = self.timing;
         let of = |setting: Setting, machine: f64| (setting, self.own(setting).unwrap_or(machine.round() as u16));
         let beam_to_tool = of(Setting::BeamToToolMm, beam_to_tool_mm);
-        let notice_mm = f64::from(beam_to_tool.1) - f64::from(margin_mm) - 2.0;
+        let notice_mm = f64::from(beam_to_tool.1) - self.before_plant_mm() - 2.0;
         let wanted_mm_s = (1.25 * self.motion.top_speed_mm_s()).max(SLOWEST_TOP_SPEED_MM_S);
         let top_speed_mm_s = wanted_mm_s.min(notice_mm / self.notice_s()).min(TOP_SPEED_MM_S);
         let mut settings = vec![
@@ -150,7 +155,8 @@ impl Pass {
 impl Conditions {
     /// The machine. The seed selects its servo's and encoder's random deviations.
     pub fn machine(&self, seed: u64) -> Machine {
-        let Mechanism { beam_to_tool_mm, second_beam_mm, arm_mm, arm, tool_width_mm, .. } = self.machine;
+        let Mechanism { beam_to_tool_mm, second_beam_mm, arm_mm, arm, tool_width_mm, tool_length_mm, .. } =
+            self.machine;
         let Mechanism { dead_time_ms, dead_time_scatter_ms, travel_ms, load_kg_cm, stall_kg_cm, .. } = self.machine;
         let scatter = Scatter { dead_time_ms: dead_time_scatter_ms, load: load_kg_cm / stall_kg_cm, seed };
         // The stroke follows from the firmware's settings.
@@ -163,6 +169,7 @@ impl Conditions {
             arm_mm,
             arm,
             tool_width_mm,
+            tool_length_mm,
             servo: Servo { in_us, out_us, dead_time_ms, travel_ms, scatter },
             beam_mm: self.sensors.beam_mm,
             beam_response_ms: self.sensors.beam_response_ms,

@@ -121,6 +121,12 @@ impl Stem {
     pub(crate) fn half_chord_mm(&self, beside_mm: f64) -> f64 {
         (self.protected_mm.powi(2) - beside_mm.powi(2)).max(0.0).sqrt()
     }
+
+    /// The same over the length of a tool that reaches this far ahead of its middle and behind it: the widest part of the
+    /// zone there.
+    pub(crate) fn half_chord_beside_mm(&self, beside_mm: f64, half_length_mm: f64) -> f64 {
+        self.half_chord_mm((beside_mm.abs() - half_length_mm).max(0.0))
+    }
 }
 
 /// The problem of a canopy or a row, and what would be right.

@@ -1,8 +1,8 @@
 //! Damage and weeding as geometry: the ground that the tools pass through, seen from above.
 //!
 //! The arm swings sideways, so the tool's middle is `arm * sin(angle)` to the left of the row's line. An arm that trails
-//! behind its pivot also carries the tool forward. The tool is `tool_width` wide across the row, and is treated as a line
-//! across it. A plant is *damaged* if the tool passes through the protected zone round its stem. A weed is *removed* if the tool or a sweep passes it. The
+//! behind its pivot also carries the tool forward. The tool is a rectangle: `tool_width` across the row and `tool_length`
+//! along it, half ahead of its middle and half behind. With a length of 0 it is a line. A plant is *damaged* if the tool passes through the protected zone round its stem. A weed is *removed* if the tool or a sweep passes it. The
 //! sweeps run between the rows, do not swing, and stay clear of the zones while the machine keeps its line. If the
 //! machine strays, they cut plants of this row or of the next rows. So does a tool that swings as far as the next row.
 //! Each kind of damage is counted by itself. A strip that no tool weeds may remain between the tool in the row and the
@@ -183,7 +183,7 @@ impl Swinging<'_> {
         middle_mm - half_mm..middle_mm + half_mm
     }
 
-    /// The ground below the tool at a time, with its angle then.
+    /// The ground below the tool's middle at a time, with its angle then.
     fn place_mm(&self, time_s: f64) -> (f64, f64) {
         let degrees = self.stroke.degrees(time_s);
         (self.machine.tool_mm(self.motion.position_mm(time_s)) + self.machine.forward_mm(degrees), degrees)
@@ -197,12 +197,13 @@ impl Swinging<'_> {
     /// Whether the tool passes through the zone round a stem.
     pub fn damages(&self, stem: &Stem) -> bool {
         let Stem { along_mm, across_mm, protected_mm, .. } = *stem;
-        let x_mm = self.machine.beam_to_tool_mm;
-        let zone = along_mm - protected_mm + x_mm - self.farthest_forward_mm()..along_mm + protected_mm + x_mm;
+        let (x_mm, half_mm) = (self.machine.beam_to_tool_mm, self.machine.half_length_mm());
+        let reach_mm = protected_mm + half_mm;
+        let zone = along_mm - reach_mm + x_mm - self.farthest_forward_mm()..along_mm + reach_mm + x_mm;
         let enters = |time_s: f64| {
             let (place_mm, degrees) = self.place_mm(time_s);
             let across_mm = self.across_mm(place_mm, across_mm);
-            let half_chord_mm = stem.half_chord_mm(place_mm - along_mm);
+            let half_chord_mm = stem.half_chord_beside_mm(place_mm - along_mm, half_mm);
             let covered = self.covered_mm(degrees);
             half_chord_mm > 0.0 && covered.start < across_mm + half_chord_mm && across_mm - half_chord_mm < covered.end
         };
@@ -237,19 +238,24 @@ impl Swinging<'_> {
         let across_mm = self.across_mm(weed.along_mm, weed.across_mm);
         let covers = |degrees: f64| self.covered_mm(degrees).contains(&across_mm);
         let at_mm = weed.along_mm + self.machine.beam_to_tool_mm;
-        let forward_mm = self.farthest_forward_mm();
+        let (forward_mm, half_mm) = (self.farthest_forward_mm(), self.machine.half_length_mm());
         if forward_mm == 0.0 {
-            return self.motion.passings(at_mm).any(|passing| covers(self.stroke.degrees(passing.time_s)));
+            let is_passed = self.motion.passings(at_mm).any(|passing| covers(self.stroke.degrees(passing.time_s)));
+            if is_passed || half_mm == 0.0 {
+                return is_passed;
+            }
         }
         // The arm moves the tool along the row as well, so it may pass the weed several times. The last time it is behind the
-        // weed, not just at it.
-        self.motion.times_within_s(&(at_mm - forward_mm..at_mm + 1.0)).into_iter().any(|times| {
+        // weed, not just at it. A tool with a length may also come over the weed from the side.
+        let near_mm = at_mm - half_mm - forward_mm..at_mm + half_mm.max(1.0);
+        self.motion.times_within_s(&near_mm).into_iter().any(|times| {
             let samples = ((times.end - times.start) / SAMPLE_S).ceil() as u32;
             let mut before = self.place_mm(times.start).0 >= weed.along_mm;
             (1..=samples).any(|sample| {
                 let (place_mm, degrees) = self.place_mm((times.start + f64::from(sample) * SAMPLE_S).min(times.end));
                 let is_past = place_mm >= weed.along_mm;
-                std::mem::replace(&mut before, is_past) != is_past && covers(degrees)
+                let has_passed = std::mem::replace(&mut before, is_past) != is_past;
+                (has_passed || (place_mm - weed.along_mm).abs() < half_mm) && covers(degrees)
             })
         })
     }

@@ -8,7 +8,7 @@
 //! A keep-out zone is the plant's canopy, as wide across the row as along it. The tool has to be fully out over it. With
 //! a stem zone, the keep-out zone is the part of the canopy that the firmware keeps, and each of its ends is half of the
 //! stem zone's circle. Only the part of the tool that reaches the circle counts. A canopy has the width that the beam saw
-//! only at the beam's height.
+//! only at the beam's height. The margin reaches to the tool's middle along the row, so half of the tool's length is in it.
 //!
 //! A swing is also compared with its ideal position. The ideal follows from the true ends of the canopy, the margin,
 //! the leads of the [`ZoneSettings`] and the true speed at that moment. Plants that share one swing share its two commands:
@@ -22,7 +22,7 @@ pub use self::timing::ZoneSettings;
 use self::swing::Swing;
 use self::timing::Level;
 use crate::driving::Steering;
-use crate::ground::{share_of, union};
+use crate::ground::{between, share_of, union};
 use crate::machine::Machine;
 use crate::motion::Motion;
 use crate::row::{Canopy, Row};
@@ -149,10 +149,11 @@ pub fn weedable_share(row: &Row, machine: &Machine, motion: &Motion, timing: Zon
             let first = motion.passings(ground_mm + machine.beam_to_tool_mm).next();
             first.map_or(0.0, |passing| motion.speed_mm_s(passing.time_s).abs())
         };
-        let (window, kept) = (timing.window_mm(plant), timing.kept_mm(plant));
+        let kept = timing.kept_mm(plant);
+        let margin_mm = (f64::from(timing.margin_mm) - machine.half_length_mm()).max(0.0);
+        let window = kept.start - margin_mm..kept.end + margin_mm;
         let farthest_mm = |speed_mm_s: f64| {
-            let of_level =
-                |&(level, swing_s): &(Level, f64)| speed_mm_s * swing_s - level.inside_mm(&kept, timing.stem_zone_mm);
+            let of_level = |&(level, swing_s): &(Level, f64)| speed_mm_s * swing_s - level.inside_mm;
             levels.iter().map(of_level).fold(f64::NEG_INFINITY, f64::max)
         };
         window.start - farthest_mm(speed_mm_s(window.start))..window.end + farthest_mm(speed_mm_s(window.end))
@@ -172,6 +173,7 @@ pub fn judge(
     let commands = machine.servo.commands(pulses);
     let stroke = machine.servo.stroke(&commands, start_cycle);
     let whole_s = 0.0..motion.duration_s();
+    let half_mm = machine.half_length_mm();
     let ground_below = |degrees: f64| {
         let forward_mm = machine.forward_mm(degrees);
         let worked_mm = |times_s: &Range<f64>| {
@@ -179,7 +181,7 @@ pub fn judge(
             // A tool that comes back into the row is carried back along it.
             let back_mm =
                 if forward_mm > 0.0 { carried_back_mm(machine, motion, &stroke, times_s) } else { ground.start };
-            back_mm..ground.end + forward_mm
+            back_mm - half_mm..ground.end + forward_mm + half_mm
         };
         union(stroke.times_below_s(degrees, &whole_s).iter().map(worked_mm).collect())
     };
@@ -200,6 +202,7 @@ pub fn judge(
     let works = |place_mm: f64| {
         let mut passings = motion.passings(place_mm + machine.beam_to_tool_mm);
         passings.any(|passing| stroke.degrees(passing.time_s) < machine.line_degrees())
+            || half_mm > 0.0 && weeded.iter().any(|ground| ground.contains(&place_mm))
     };
 
     let mut plants: Vec<PlantOutcome> =
@@ -262,8 +265,7 @@ fn plant_outcome(
     let (clear_mm, back_mm) = swings_beside(closed, &kept, plant.position_mm);
     let (mut clearance_before_mm, mut clearance_behind_mm) = (None, None);
     for (level, ground) in over_zone {
-        let inside_mm = level.inside_mm(&kept, timing.stem_zone_mm);
-        let zone = kept.start + inside_mm..kept.end - inside_mm;
+        let zone = kept.start + level.inside_mm..kept.end - level.inside_mm;
         let (out_mm, in_mm) = swings_beside(ground, &zone, plant.position_mm);
         let lesser = |clearance_mm, now_mm| [clearance_mm, now_mm].into_iter().flatten().reduce(f64::min);
         clearance_before_mm = lesser(clearance_before_mm, out_mm.map(|out_mm| zone.start - out_mm));
@@ -273,7 +275,7 @@ fn plant_outcome(
     // A stroke that ends within the zone does not clear it.
     let verdict = if narrowest_mm < 0.0 || machine.room_mm() < timing.kept_across_mm(plant) / 2.0 {
         Verdict::Reached
-    } else if narrowest_mm < f64::from(timing.margin_mm) - MARGIN_TOLERANCE_MM {
+    } else if narrowest_mm < f64::from(timing.margin_mm) - machine.half_length_mm() - MARGIN_TOLERANCE_MM {
         Verdict::MarginCut
     } else {
         Verdict::Kept
@@ -320,13 +322,6 @@ fn carried_back_mm(machine: &Machine, motion: &Motion, stroke: &Stroke, times_s:
 /// Steps that are together longer than a swing.
 const SWING_STEPS: u32 = 500;
 const SWING_STEP_S: f64 = 0.001;
-
-/// The parts of `whole` between the stretches of a union.
-fn between(union: &[Range<f64>], whole: &Range<f64>) -> Vec<Range<f64>> {
-    let starts = std::iter::once(whole.start).chain(union.iter().map(|stretch| stretch.end));
-    let ends = union.iter().map(|stretch| stretch.start).chain([whole.end]);
-    starts.zip(ends).map(|(start, end)| start..end).filter(|stretch| stretch.start < stretch.end).collect()
-}
 
 fn path(machine: &Machine, motion: &Motion, stroke: &Stroke) -> Vec<(f64, f64)> {
     let during_s = 0.0..motion.duration_s();

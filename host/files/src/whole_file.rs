@@ -1,13 +1,15 @@
 //! Writes a file completely or not at all: after an error the old file is still there.
 //!
 //! The text goes to a temporary file in the same folder, which is then renamed. If the path is a link, its target is
-//! replaced. Paths that are no files, such as `/dev/null` or a pipe, are written directly. Folders are not made. Error
-//! messages name the path, not the temporary file.
+//! replaced. Paths that are no files, such as `/dev/null` or a pipe, are written directly, once the text is complete.
+//! Folders are not made. Error messages name the path, not the temporary file.
 
 use std::borrow::Cow;
 use std::fs::OpenOptions;
 use std::io::{self, ErrorKind, Write};
-use std::path::Path;
+#[cfg(unix)]
+use std::os::unix::fs::{MetadataExt, fchown};
+use std::path::{Path, PathBuf};
 use tempfile::{Builder, NamedTempFile};
 
 /// Writes a file, or replaces one.
@@ -17,11 +19,19 @@ use tempfile::{Builder, NamedTempFile};
 pub fn write<E: From<io::Error>>(path: &Path, contents: impl FnOnce(&mut dyn Write) -> Result<(), E>) -> Result<(), E> {
     let path = target(path);
     if is_device(&path) {
-        let mut buffered = io::BufWriter::new(OpenOptions::new().write(true).open(&path)?);
-        contents(&mut buffered)?;
-        return Ok(buffered.flush()?);
+        let mut device = OpenOptions::new().write(true).open(&path)?;
+        // A buffered writer would try again when it is dropped, behind what a failed try has written.
+        let mut text = Vec::new();
+        contents(&mut text)?;
+        return Ok(device.write_all(&text)?);
     }
     let mut file = temporary(&path)?;
+    // A file that its owner alone may read stays so, also if root writes it. Some file systems have no such permissions.
+    #[cfg(unix)]
+    if let Ok(there) = path.metadata() {
+        let _ = fchown(file.as_file(), Some(there.uid()), Some(there.gid()));
+        let _ = file.as_file().set_permissions(there.permissions());
+    }
     let mut buffered = io::BufWriter::new(file.as_file_mut());
     contents(&mut buffered)?;
     buffered.flush()?;
@@ -65,9 +75,19 @@ pub fn check_folder(folder: &Path) -> io::Result<()> {
     temporary_in(folder).map(drop)
 }
 
-/// The file itself, if the path is a link to one.
+/// The file itself, if the path is a link to one. That file may not be there yet.
 fn target(path: &Path) -> Cow<'_, Path> {
-    path.canonicalize().map_or(Cow::Borrowed(path), Cow::Owned)
+    path.canonicalize().ok().or_else(|| missing_target(path)).map_or(Cow::Borrowed(path), Cow::Owned)
+}
+
+/// The path to which a link leads that has no file yet, also by further links. `None` if the path is no such link. A
+/// pipe's name in `/dev/fd` is a link that can be opened, and leads to no path.
+fn missing_target(path: &Path) -> Option<PathBuf> {
+    /// As many as Linux follows. A link may lead back to itself.
+    const LINKS: usize = 40;
+    let next = |link: &PathBuf| Some(link.parent()?.join(link.read_link().ok()?));
+    let first = next(&path.to_path_buf()).filter(|_| !path.exists());
+    std::iter::successors(first, next).take(LINKS).last()
 }
 
 /// Whether the path exists and is no file. Such a path must not be replaced.
@@ -128,6 +148,13 @@ mod tests {
         }
         fs::write(&plain, "").unwrap();
         assert_eq!(fs::metadata(&path).unwrap().permissions(), fs::metadata(&plain).unwrap().permissions());
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            fs::set_permissions(&path, PermissionsExt::from_mode(0o600)).unwrap();
+            write(&path, |to| to.write_all(b"third")).unwrap();
+            assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o600);
+        }
     }
 
     #[test]
@@ -153,9 +180,36 @@ mod tests {
         write(&link, |to| to.write_all(b"new")).unwrap();
         assert!(link.is_symlink());
         assert_eq!(fs::read_to_string(&file).unwrap(), "new");
+        // Through another link from another folder, to a file that is not there yet.
+        let (other, far) = (folder.path().join("other"), folder.path().join("other/far.csv"));
+        fs::create_dir(&other).unwrap();
+        fs::remove_file(&file).unwrap();
+        std::os::unix::fs::symlink("../newest.csv", &far).unwrap();
+        check(&far).unwrap();
+        write(&far, |to| to.write_all(b"first")).unwrap();
+        assert!(link.is_symlink() && far.is_symlink() && !file.is_symlink());
+        assert_eq!(fs::read_to_string(&file).unwrap(), "first");
         write(Path::new("/dev/null"), |to| to.write_all(b"nothing")).unwrap();
         assert!(!Path::new("/dev/null").is_file());
         let full = write(Path::new("/dev/full"), |to| to.write_all(b"more than a disk holds")).unwrap_err();
         assert_eq!(full.kind(), ErrorKind::StorageFull);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_device_gets_nothing_of_a_text_that_fails_half_way() {
+        use std::io::Read;
+        use std::os::fd::AsRawFd;
+        let (mut read, write_end) = io::pipe().unwrap();
+        let path = format!("/dev/fd/{}", write_end.as_raw_fd());
+        let error = write(Path::new(&path), |to| {
+            to.write_all(b"half")?;
+            Err(io::Error::other("no more"))
+        });
+        assert_eq!(error.unwrap_err().to_string(), "no more");
+        drop(write_end);
+        let mut there = String::new();
+        read.read_to_string(&mut there).unwrap();
+        assert_eq!(there, "");
     }
 }

@@ -18,6 +18,6 @@ pub mod source;
 pub use course::CourseArguments;
 pub use destination::{OutFile, OutFolder, OutName, Replace, write_if_asked};
 pub use numbers::{number_within, whole_within};
-pub use output::{command_line, print, print_to, tell_line};
+pub use output::{Printed, command_line, print, print_to, printing_aside, tell_line, teller};
 pub use program::Finding;
 pub use progress::{Show, with_bar};

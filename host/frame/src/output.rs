@@ -4,12 +4,23 @@
 //! usual status. Any other failure to print a result, such as a full disk, is the command's error. Messages beside the
 //! result are for an operator who watches, so a failure to print them is ignored. Messages quote files and machines,
 //! which may contain control characters. These are removed before they reach a terminal.
+//!
+//! A stopped terminal takes no output: Ctrl-S stops it, and so does a text selection on Windows, or an ssh whose network
+//! stalls. A pipe whose reader pauses does the same. Printing then waits. A command that may have to send a HOLD prints by
+//! [`teller`] or [`printing_aside`], in a thread of its own.
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use files::in_a_line;
 use std::env;
 use std::fmt::Arguments;
 use std::io::{self, ErrorKind, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::{self, Receiver, Sender};
+use std::thread;
+
+/// Most messages of a [`teller`] that wait to be printed.
+const WAITING: usize = 64;
 
 /// Prints a line of a result. Takes the arguments of `println!`, and returns the result of [`print()`](crate::print()).
 #[macro_export]
@@ -48,6 +59,80 @@ pub fn tell_line(line: Arguments) {
     let _ = writeln!(io::stderr(), "{}", in_a_line(&line.to_string()));
 }
 
+/// A function that prints messages as [`tell!`] does, in a thread of its own: it never waits. Messages that find 64
+/// others waiting are dropped. Their number is printed once the output takes messages again.
+pub fn teller() -> impl Fn(&str) + Send + Sync + 'static {
+    teller_by(|line| tell_line(format_args!("{line}")))
+}
+
+/// The same, with a function that prints.
+fn teller_by(print: impl Fn(&str) + Send + 'static) -> impl Fn(&str) + Send + Sync + 'static {
+    let (lines, waiting) = mpsc::sync_channel::<String>(WAITING);
+    let dropped = Arc::new(AtomicUsize::new(0));
+    let to_report = Arc::clone(&dropped);
+    thread::spawn(move || {
+        for line in waiting {
+            print(&line);
+            let count = to_report.swap(0, Ordering::Relaxed);
+            if count > 0 {
+                print(&format!("Messages dropped while this output was stopped: {count}"));
+            }
+        }
+    });
+    move |line: &str| {
+        if lines.try_send(line.to_owned()).is_err() {
+            dropped.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+}
+
+/// What [`printing_aside`] prints, without the line's end.
+#[derive(Debug)]
+pub enum Printed {
+    /// A line of the result.
+    Result(String),
+    /// A message, as by [`tell!`].
+    Message(String),
+}
+
+/// Does work whose lines are printed in a thread of its own: the work never waits for the output. All lines are
+/// printed, in their order, before this returns.
+///
+/// # Errors
+/// The work's error. If a line of the result cannot be printed, as by [`print()`]: this error is printed at once, and the
+/// rest of the result is dropped.
+pub fn printing_aside<T>(
+    output: &mut (impl Write + Send),
+    work: impl FnOnce(Sender<Printed>) -> Result<T>,
+) -> Result<T> {
+    let (lines, waiting) = mpsc::channel();
+    thread::scope(|scope| {
+        let printing = scope.spawn(move || print_all(waiting, output));
+        let done = work(lines)?;
+        // A thread that panicked has printed why.
+        ensure!(printing.join().unwrap_or(false), "not all could be printed");
+        Ok(done)
+    })
+}
+
+/// Returns whether all could be printed.
+fn print_all(waiting: Receiver<Printed>, output: &mut impl Write) -> bool {
+    let mut is_printed = true;
+    for line in waiting {
+        match line {
+            Printed::Message(line) => tell!("{line}"),
+            Printed::Result(line) if is_printed => {
+                if let Err(error) = print_to(output, format_args!("{line}\n")) {
+                    tell!("error: {error:#}");
+                    is_printed = false;
+                }
+            }
+            Printed::Result(_) => {}
+        }
+    }
+    is_printed
+}
+
 /// The command as it was typed, for a report that says how to make it again. Fails if a word cannot be quoted for a
 /// shell.
 pub fn command_line() -> Result<String> {
@@ -55,4 +140,35 @@ pub fn command_line() -> Result<String> {
     let words = words.iter().map(|word| word.to_string_lossy());
     let words: Vec<_> = ["weeder".into()].into_iter().chain(words).collect();
     Ok(shlex::try_join(words.iter().map(AsRef::as_ref))?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messages_to_a_stopped_output_wait_for_none_and_those_without_room_are_counted() {
+        const SENT: usize = 100;
+        let (stopped, until) = mpsc::channel::<()>();
+        let (taken, is_taken) = mpsc::channel();
+        let (printed, seen) = mpsc::channel();
+        let tell = teller_by(move |line| {
+            let _ = taken.send(());
+            // An error too: the output takes messages again.
+            let _ = until.recv();
+            let _ = printed.send(line.to_owned());
+        });
+        // It would never return here, if a message waited for the output.
+        tell("0");
+        is_taken.recv().expect("the thread has taken it");
+        (1..SENT).for_each(|number| tell(&number.to_string()));
+        drop((stopped, tell));
+        let seen: Vec<String> = seen.iter().collect();
+        let (reports, shown): (Vec<_>, Vec<_>) =
+            seen.into_iter().partition(|line| line.starts_with("Messages dropped"));
+        assert_eq!(shown.len(), 1 + WAITING, "{shown:?}");
+        assert!(shown.iter().enumerate().all(|(number, line)| *line == number.to_string()), "{shown:?}");
+        let report = format!("Messages dropped while this output was stopped: {}", SENT - shown.len());
+        assert_eq!(reports, [report]);
+    }
 }

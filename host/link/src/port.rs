@@ -7,9 +7,9 @@ use super::error::LinkError;
 use nusb::MaybeFuture;
 use serialport::{ErrorKind, SerialPort, SerialPortInfo, SerialPortType, UsbPortInfo};
 use std::collections::HashSet;
-use std::fs::{File, TryLockError};
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Read};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Bits in a second on the firmware's serial line.
@@ -18,10 +18,17 @@ const BAUD: u32 = 115_200;
 /// Longest wait of a read for a byte, and of a write for room.
 const PATIENCE: Duration = Duration::from_millis(20);
 
-/// The name of the Uno, and its USB vendors and products.
+/// The name of the Uno, and the USB vendors and products of Uno and Uno Mini (boards.txt of Arduino's AVR core).
 const UNO: &str = "Uno";
-const UNOS: [(u16, u16); 5] =
-    [(0x2341, 0x0001), (0x2341, 0x0043), (0x2341, 0x0243), (0x2A03, 0x0043), (0x2A03, 0x0243)];
+const UNOS: [(u16, u16); 7] = [
+    (0x2341, 0x0001),
+    (0x2341, 0x0043),
+    (0x2341, 0x0062),
+    (0x2341, 0x006A),
+    (0x2341, 0x0243),
+    (0x2A03, 0x0043),
+    (0x2A03, 0x0243),
+];
 
 /// Those of the converters on compatible boards, and their names. Other devices have them too, such as satellite receivers.
 const CONVERTERS: [((u16, u16), &str); 15] = [
@@ -178,7 +185,7 @@ pub fn try_port(name: &str) -> Result<(), LinkError> {
 /// Opens a port by its name. Also returns whether this has reset the Uno.
 pub(super) fn open(name: &str) -> Result<(Box<dyn SerialPort>, bool), LinkError> {
     // avrdude does not keep other programs off the port, and a reset would end its work.
-    if let Ok(lock) = File::open(lock_of(name))
+    if let Ok(lock) = open_lock(&lock_of(name), File::options().read(true))
         && matches!(lock.try_lock_shared(), Err(TryLockError::WouldBlock))
     {
         return Err(LinkError::Flashed(name.to_owned()));
@@ -208,7 +215,8 @@ pub struct Claim {
 pub fn claim(name: &str) -> Result<Claim, LinkError> {
     let path = lock_of(name);
     // Another user's file can be locked, but not written. Windows locks no file that is only appended to.
-    let lock = File::options().read(true).create(true).append(true).open(&path).or_else(|_| File::open(&path));
+    let lock = open_lock(&path, File::options().read(true).create(true).append(true))
+        .or_else(|_| open_lock(&path, File::options().read(true)));
     let not_locked = |source| LinkError::NotClaimed { path: path.clone(), source };
     let lock = lock.map_err(not_locked)?;
     // Other users lock it too, so the mode does not follow the umask. Setting it fails if the file is another user's.
@@ -221,10 +229,21 @@ pub fn claim(name: &str) -> Result<Claim, LinkError> {
     }
 }
 
-/// The file that is locked while a port is claimed. It stays, because another program may be about to lock it.
+/// The file that is locked while a port is claimed. It stays, because another program may be about to lock it. On Unix,
+/// `TMPDIR` would give each user another one: the folder is the same for all.
 fn lock_of(name: &str) -> PathBuf {
     let port = resolved(name).replace(|part: char| !part.is_ascii_alphanumeric(), "-");
-    std::env::temp_dir().join(format!("weeder{port}.lock"))
+    let folder = if cfg!(unix) { PathBuf::from("/tmp") } else { std::env::temp_dir() };
+    folder.join(format!("weeder{port}.lock"))
+}
+
+/// Opens such a file. Fails if it is no regular file. Any user may put a link there, or a pipe, at which a program would
+/// wait for a writer.
+fn open_lock(path: &Path, options: &mut OpenOptions) -> io::Result<File> {
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::custom_flags(options, libc::O_NOFOLLOW | libc::O_NONBLOCK);
+    let lock = options.open(path)?;
+    if lock.metadata()?.is_file() { Ok(lock) } else { Err(io::Error::other("it is no regular file: remove it")) }
 }
 
 /// Opens a claimed port at `baud` bits a second and resets the Uno.
@@ -306,8 +325,12 @@ pub(super) mod tests {
         let other = SerialPortInfo { port_name: "ttyS0".to_owned(), port_type: SerialPortType::Unknown };
         let (one, two) = (usb("ttyACM0", UNOS[1], None), usb("ttyACM1", UNOS[3], None));
         let (nano, receiver) = (usb("ttyUSB0", NANO, None), usb("ttyUSB1", RECEIVER, None));
-        for ports in [vec![other.clone(), one.clone()], vec![nano.clone(), one.clone(), receiver.clone()]] {
-            assert_eq!(only(&ports, None).unwrap(), "ttyACM0");
+        // Another Uno of boards.txt, and the Uno Mini.
+        let newer = [(0x2341, 0x006A), (0x2341, 0x0062)].map(|number| usb("ttyACM0", number, None));
+        for uno in [&one, &newer[0], &newer[1]] {
+            for ports in [vec![other.clone(), uno.clone()], vec![nano.clone(), uno.clone(), receiver.clone()]] {
+                assert_eq!(only(&ports, None).unwrap(), "ttyACM0");
+            }
         }
         assert_eq!(only(&[nano.clone(), receiver.clone()], Some("ttyUSB1")).unwrap(), "ttyUSB0");
         for (ports, beside, words) in [
@@ -376,6 +399,34 @@ pub(super) mod tests {
             assert_eq!(mode & 0o777, 0o644, "another user can lock it");
         }
         std::fs::remove_file(lock_of(port)).unwrap();
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_pipe_or_a_link_in_the_lock_s_place_stops_no_program_and_changes_no_file() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let [port, private] = ["port", "private"].map(|name| folder.path().join(name));
+        for path in [&port, &private] {
+            std::fs::write(path, "").unwrap();
+            std::fs::set_permissions(path, PermissionsExt::from_mode(0o600)).unwrap();
+        }
+        let port = port.to_str().unwrap();
+        let lock = lock_of(port);
+        assert_eq!(lock.parent(), Some(Path::new("/tmp")), "it is the same for all users");
+        let is_not_claimed = || matches!(claim(port), Err(LinkError::NotClaimed { .. }));
+
+        assert!(std::process::Command::new("mkfifo").arg(&lock).status().unwrap().success());
+        // With a wait for a writer, these would never return.
+        let tried = try_port(port).unwrap_err().to_string();
+        let pipe_is_refused = is_not_claimed();
+        std::fs::remove_file(&lock).unwrap();
+
+        std::os::unix::fs::symlink(&private, &lock).unwrap();
+        let link_is_refused = is_not_claimed();
+        std::fs::remove_file(&lock).unwrap();
+        assert!(pipe_is_refused && link_is_refused && tried.ends_with("cannot be opened as a serial port"), "{tried}");
+        assert_eq!(std::fs::metadata(&private).unwrap().permissions().mode() & 0o777, 0o600);
     }
 
     #[test]

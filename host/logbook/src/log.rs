@@ -11,7 +11,7 @@ use files::bounded_file::RECORDED_MIB;
 use files::{CsvTable, FileError, in_a_line};
 use link::session::Happening;
 use std::fs::{File, OpenOptions};
-use std::io::{self, ErrorKind, Read, Seek, SeekFrom};
+use std::io::{self, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use strum::{EnumString, IntoStaticStr, VariantNames};
@@ -118,7 +118,7 @@ fn open_alone(path: &Path) -> io::Result<File> {
 /// Writes a log.
 pub struct LogWriter {
     path: PathBuf,
-    file: csv::Writer<File>,
+    file: File,
     disk: Disk,
     began: Instant,
     /// Lines below the header that were found at opening.
@@ -164,7 +164,6 @@ impl LogWriter {
             saved => saved,
         })
         .map_err(failed)?;
-        let file = csv::Writer::from_writer(file);
         let mut log = Self { path: path.into(), file, disk, began: Instant::now(), found, added: 0 };
         if whole == 0 {
             log.record(HEADER.split(','))?;
@@ -222,7 +221,7 @@ impl LogWriter {
     }
 
     fn line(&mut self, time_ms: u64, kind: Kind, line: &str) -> Result<(), LogError> {
-        if self.file.get_ref().metadata().is_ok_and(|there| there.len() >= FULL) {
+        if self.file.metadata().is_ok_and(|there| there.len() >= FULL) {
             return Err(LogError::Full(self.path.clone()));
         }
         self.added += 1;
@@ -231,9 +230,16 @@ impl LogWriter {
     }
 
     fn record<'a>(&mut self, fields: impl IntoIterator<Item = &'a str>) -> Result<(), LogError> {
-        let written = self.file.write_record(fields).map_err(io::Error::from).and_then(|()| self.file.flush());
-        let written = written.and_then(|()| self.disk.written());
+        let written = self.append(fields).and_then(|()| self.disk.written());
         Ok(written.map_err(|source| FileError::unwritten(&self.path, source))?)
+    }
+
+    /// Writes a record directly. A buffer would keep a line that a full disk has cut, and write it again later.
+    fn append<'a>(&mut self, fields: impl IntoIterator<Item = &'a str>) -> io::Result<()> {
+        let mut record = csv::Writer::from_writer(Vec::new());
+        record.write_record(fields)?;
+        let bytes = record.into_inner().map_err(csv::IntoInnerError::into_error)?;
+        self.file.write_all(&bytes)
     }
 }
 
@@ -326,6 +332,28 @@ mod tests {
         let Some(LogError::File(error)) = error else { panic!("{error:?}") };
         assert_eq!(std::error::Error::source(&error).unwrap().to_string(), "the card is out");
         assert!(log.write(0, &lost).is_err());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn nothing_is_written_behind_a_line_that_a_full_disk_has_cut() {
+        use std::os::fd::OwnedFd;
+        use std::os::unix::net::UnixStream;
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let mut log = LogWriter::open(file.path()).unwrap();
+        // A full stream takes a part of a line, as a full disk does.
+        let (full, mut read) = UnixStream::pair().unwrap();
+        full.set_nonblocking(true).unwrap();
+        log.file = OwnedFd::from(full).into();
+        let (short, long) = (Happening::Lost("short".to_owned()), Happening::Lost("long".repeat(1 << 20)));
+        log.write(0, &short).unwrap();
+        assert!(matches!(log.write(0, &long), Err(LogError::File(_))));
+        read.set_nonblocking(true).unwrap();
+        let mut written = Vec::new();
+        assert_eq!(read.read_to_end(&mut written).unwrap_err().kind(), ErrorKind::WouldBlock);
+        assert!(written.starts_with(b"0,lost,short\n0,lost,longlong") && !written.ends_with(b"\n"));
+        drop(log);
+        assert_eq!(read.read_to_end(&mut written).unwrap(), 0, "the disk has room again");
     }
 
     #[test]

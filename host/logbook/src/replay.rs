@@ -337,7 +337,7 @@ mod tests {
                 (out / 95, Kind::Event, &format!("swing tool=out pos={out}")),
                 (24, Kind::Event, &format!("swing tool=in pos={back}")),
             ]);
-            for setting in ["guard_spacing_mm=500", "stem_zone_mm=90"] {
+            for setting in ["guard_spacing_mm=500", "top_speed_mm_s=1000", "stem_zone_mm=90"] {
                 log.insert(1, Entry { number: 2, time_ms: 0, kind: Kind::Setting, text: setting.to_owned() });
             }
             let replayed = replay(&log).unwrap();

@@ -2,7 +2,9 @@
 
 use crate::machine::{IntraRow, Machine};
 use crate::unit::{KG, M};
-use std::f64::consts::FRAC_PI_4;
+use std::f64::consts::{FRAC_PI_3, FRAC_PI_4};
+use uom::si::time::second;
+use uom::si::torque::newton_meter;
 
 /// Density of the arm's steel.
 const STEEL_KG_M3: f64 = 7850.0;
@@ -30,6 +32,16 @@ impl SwungArm {
             weight_kg_cm: (rod_kg / 2.0 + blade_kg) * 100.0 * length_m,
         }
     }
+}
+
+/// Time of a turn by these degrees from rest, ms, with the arm's inertia and against the soil. `load` is the share of the
+/// servo's torque that the soil takes, from 0 to below 1.
+pub fn turn_ms(machine: &Machine, degrees: f64, load: f64) -> f64 {
+    let servo_time_60_s = machine.swing.servo_time_60.get::<second>();
+    // The speed of rotation without load is 60 degrees in the data sheet's time.
+    let constant_s = SwungArm::of(machine).inertia_kg_m2 * FRAC_PI_3
+        / (servo_time_60_s * machine.intra_row.servo_torque.get::<newton_meter>());
+    from_rest(1000.0 * servo_time_60_s * degrees / 60.0 / (1.0 - load), 1000.0 * constant_s)
 }
 
 /// Time of a turn from rest, by a motor whose torque falls in a straight line to zero at its greatest speed. `steady` is the turn's

@@ -18,7 +18,7 @@
 //! # Ok::<(), mechanics::machine::MachineError>(())
 //! ```
 
-mod arm;
+pub mod arm;
 pub mod design;
 pub mod equations;
 pub mod figure;

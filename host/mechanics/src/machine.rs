@@ -170,7 +170,7 @@ sections! {
     intra_row: IntraRow {
         /// Width of cut; Eq. 7 takes 50 mm, though the sweep of Table 1 has 55 mm.
         width: Length = 50.0, MM, 5.0 to 1000.0;
-        /// Base of the triangle that the blade shows to the soil when it swings (b in Eq. 10).
+        /// Length of the blade along the row, which a swing pushes through the soil: base of the triangle (b in Eq. 10). X is to its middle.
         blade_base: Length = 45.0, MM, 1.0 to 500.0;
         /// Height of that triangle (h in Eq. 10).
         blade_height: Length = 10.0, MM, 1.0 to 300.0;
@@ -191,7 +191,7 @@ sections! {
         protected: Length = 0.0, MM, 0.0 to 200.0;
         /// How far a stem stands off the middle of its canopy, along the row.
         stem_off: Length = 10.0, MM, 0.0 to 100.0;
-        /// Room between the tool that is out and that canopy or zone: plants off the row's line, and a machine that strays.
+        /// Room between the tool that is out and that canopy or zone: plants off the row's line, a machine that strays, and play at the tip.
         room: Length = 10.0, MM, 0.0 to 300.0;
         /// How the arm hangs: 0 as a pendulum across the row, 1 if it trails along the row behind its pivot.
         arm_trails: u32 = 0.0, COUNT, 0.0 to 1.0;

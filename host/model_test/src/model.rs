@@ -107,7 +107,7 @@ impl Model {
         if self.merge_gaps.last().is_none_or(|&(_, gap)| gap != merge_gap) {
             self.merge_gaps.push((self.frontier, merge_gap));
         }
-        if self.stem_zones.last().map_or(0, |&(_, last)| last) != zone {
+        if self.stem_zones.last().is_none_or(|&(_, last)| last != zone) {
             self.stem_zones.push((self.frontier, zone));
         }
         self.narrow = self.narrow.max(settings.wheel().ticks(narrow_mm).0.into());
@@ -115,7 +115,12 @@ impl Model {
 
     /// Whether a stem zone was set.
     pub fn keeps_stems(&self) -> bool {
-        !self.stem_zones.is_empty()
+        self.widest_zone() > 0
+    }
+
+    /// The widest stem zone that was set; 0 for none.
+    pub fn widest_zone(&self) -> i64 {
+        self.stem_zones.iter().map(|&(_, zone)| zone).max().unwrap_or(0)
     }
 
     /// Whether the machine's reports may be about other ground than the model's. Then they are not checked.
@@ -149,8 +154,7 @@ impl Model {
         self.stretches.iter_mut().for_each(|stretch| stretch.trailing = stretch.trailing.min(place - 1));
         self.guarded.retain(|guarded| guarded.trailing < place);
         self.merge_gaps.clear();
-        let zone = self.stem_zones.last().copied();
-        self.stem_zones = zone.map(|(_, zone)| (place, zone)).into_iter().collect();
+        self.stem_zones.iter_mut().for_each(|(from, _)| *from = place.min(*from));
         // A plant that breaks the beam here is kept from here on.
         self.touch(0);
     }
@@ -304,8 +308,9 @@ impl Model {
 
     /// A canopy that the tool must avoid, with its margin, between `near` and `far`.
     pub fn canopy_between(&self, near: i64, far: i64, margin: i64) -> Option<Stretch> {
-        let first = self.stretches.partition_point(|stretch| stretch.trailing + margin < near);
-        let mut near_by = self.stretches[first..].iter().take_while(|stretch| stretch.leading - margin <= far);
+        let reach = margin + self.widest_zone() / 2;
+        let first = self.stretches.partition_point(|stretch| stretch.trailing + reach < near);
+        let mut near_by = self.stretches[first..].iter().take_while(|stretch| stretch.leading - reach <= far);
         let is_closed =
             |stretch: &&Stretch| self.is_met(stretch, near, far, margin) && (self.narrow == 0 || self.is_wide(stretch));
         let guarded = || self.guarded.iter().find(|stretch| self.is_met(stretch, near, far, margin));
@@ -378,7 +383,10 @@ impl Model {
     fn bounds(&self, stretch: &Stretch, margin: i64) -> Option<(i64, i64)> {
         let slack = self.slack + 2 * stretch.blur;
         let is_canopy = !stretch.is_free && stretch.trailing - stretch.leading > slack;
-        let less = slack + self.given_up(stretch) - margin;
+        // Half of the stem zone is in guarded ground already.
+        let is_guarded = self.guarded.iter().any(|guarded| guarded.leading == stretch.leading);
+        let least = if is_guarded { 0 } else { i64::MIN };
+        let less = slack + self.given_up(stretch).max(least) - margin;
         is_canopy.then_some((stretch.leading + less, (stretch.trailing - less).min(stretch.margin_to)))
     }
 

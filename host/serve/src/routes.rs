@@ -25,8 +25,8 @@ use axum::Router;
 use axum::body::{Body, Bytes, to_bytes};
 use axum::extract::{Path, Request, State};
 use axum::http::header::{
-    CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, COOKIE, HeaderName, LOCATION, REFERRER_POLICY, RETRY_AFTER,
-    SET_COOKIE, TRANSFER_ENCODING, X_CONTENT_TYPE_OPTIONS,
+    CACHE_CONTROL, CONNECTION, CONTENT_SECURITY_POLICY, CONTENT_TYPE, COOKIE, HeaderName, LOCATION, REFERRER_POLICY,
+    RETRY_AFTER, SET_COOKIE, TRANSFER_ENCODING, X_CONTENT_TYPE_OPTIONS,
 };
 use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri};
 use axum::middleware::{Next, from_fn_with_state};
@@ -316,21 +316,27 @@ fn refused(status: StatusCode, why: impl Display) -> Response {
     (status, format!("error: {why}\n")).into_response()
 }
 
-/// Reads a request with its short body. Otherwise returns the error.
+/// Reads a request with its short body. Otherwise returns the error, which closes the connection: its next bytes may be
+/// no request.
 async fn whole(request: Request) -> Result<Request, Response> {
     // With `Content-Length` as well, it may be an attempt at request smuggling (RFC 9112, section 6.1). hyper drops one of
     // the two before any other code sees the request. Browsers send `Content-Length` alone.
     if request.headers().contains_key(TRANSFER_ENCODING) {
-        return Err(refused(StatusCode::BAD_REQUEST, "send Content-Length, not Transfer-Encoding"));
+        return Err(unread(StatusCode::BAD_REQUEST, "send Content-Length, not Transfer-Encoding"));
     }
     let (head, body) = request.into_parts();
     match timeout(BODY_TIME, to_bytes(body, BODY_BYTES)).await {
         Ok(Ok(bytes)) => Ok(Request::from_parts(head, Body::from(bytes))),
         // Any other error means that the body is too long.
-        Ok(Err(error)) if is_malformed(&error) => Err(refused(StatusCode::BAD_REQUEST, "the body ends too soon")),
-        Ok(Err(_)) => Err(refused(StatusCode::PAYLOAD_TOO_LARGE, Forbidden::NoLine)),
-        Err(_) => Err(refused(StatusCode::REQUEST_TIMEOUT, "the line has not come")),
+        Ok(Err(error)) if is_malformed(&error) => Err(unread(StatusCode::BAD_REQUEST, "the body ends too soon")),
+        Ok(Err(_)) => Err(unread(StatusCode::PAYLOAD_TOO_LARGE, Forbidden::NoLine)),
+        Err(_) => Err(unread(StatusCode::REQUEST_TIMEOUT, "the line has not come")),
     }
+}
+
+/// The answer to a request whose body was not read. The connection then closes.
+fn unread(status: StatusCode, why: impl Display) -> Response {
+    ([(CONNECTION, "close")], refused(status, why)).into_response()
 }
 
 /// Whether hyper could not read a body.
@@ -396,6 +402,17 @@ mod tests {
         ] {
             assert_eq!(redirect(query).as_deref(), address, "{query}");
         }
+    }
+
+    #[tokio::test]
+    async fn a_request_whose_body_is_not_read_closes_its_connection() {
+        let chunked = Request::builder().header(TRANSFER_ENCODING, "chunked").body(Body::from("hold"));
+        let long = Request::builder().body(Body::from("h".repeat(BODY_BYTES + 1)));
+        for (request, status) in [(chunked, StatusCode::BAD_REQUEST), (long, StatusCode::PAYLOAD_TOO_LARGE)] {
+            let answer = whole(request.unwrap()).await.unwrap_err();
+            assert_eq!((answer.status(), &answer.headers()[CONNECTION]), (status, &HeaderValue::from_static("close")));
+        }
+        assert!(whole(Request::new(Body::from("hold"))).await.is_ok());
     }
 
     #[tokio::test]

@@ -6,7 +6,7 @@
 //! inside the zone. The faster the machine, the longer is this distance and the shorter its time. So leads for the
 //! highest speed hold below it.
 
-/// An arm and its servo. The default is the paper's. A longer arm swings farther aside, and leads save less.
+/// An arm with its blade and its servo. The default is the paper's. A longer arm swings farther aside, and leads save less.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arm {
     /// From the servo's axis to the blade's tip, mm.
@@ -15,11 +15,13 @@ pub struct Arm {
     pub us_for_90: f64,
     /// The servo's time for 90 degrees without load, ms.
     pub ms_for_90: f64,
+    /// The blade's length along the row, mm, with the distance to the tool measured to its middle.
+    pub blade_length_mm: f64,
 }
 
 impl Default for Arm {
     fn default() -> Self {
-        Self { length_mm: 350.0, us_for_90: 1000.0, ms_for_90: 240.0 }
+        Self { length_mm: 350.0, us_for_90: 1000.0, ms_for_90: 240.0, blade_length_mm: 45.0 }
     }
 }
 

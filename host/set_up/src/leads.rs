@@ -10,6 +10,10 @@ use control::settings::{Setting, Settings};
 const SCATTER_OUT_MS: f64 = 20.0;
 const SCATTER_IN_MS: f64 = 9.0;
 
+/// The most by which the lead out is shortened. With an end switch, the firmware raises an alarm if the tool is not out 100 ms
+/// after its lead. The other 40 ms are for the switch and for a servo that has become slower.
+const MOST_SAVED_OUT_MS: f64 = 60.0;
+
 /// What the two measured leads differ by beside the stroke: the longest wait of a command, and the scatter of a hobby
 /// servo's dead time.
 const BESIDE_STROKE_MS: f64 = 40.0;
@@ -28,8 +32,9 @@ pub(crate) struct TimedServo {
 /// The leads that follow from the times. Those seen by eye are not shortened.
 pub(crate) fn leads(timings: &[TimedServo], settings: &Settings, arm: Arm) -> Vec<(Setting, u16)> {
     let [saved_out_ms, saved_in_ms] = if keeps_stems(settings) {
-        let [top_mm_s, zone_mm] =
-            [Setting::TopSpeedMmS, Setting::StemZoneMm].map(|setting| settings.get(setting).into());
+        // A speed that is raised again needs no longer leads.
+        let top_mm_s = settings.get(Setting::TopSpeedMmS).max(Setting::TopSpeedMmS.default()).into();
+        let zone_mm = settings.get(Setting::StemZoneMm).into();
         let (pulse_us, longest_ms) = (stroke_us(settings), travel_ms(timings));
         let saved = |travel_ms: f64| saved_ms(top_mm_s, travel_ms, zone_mm, arm.aside_mm(pulse_us));
         // The longest travel is one against the soil. The way back may have no load.
@@ -63,7 +68,8 @@ pub(crate) fn travel_ms(timings: &[TimedServo]) -> f64 {
 pub fn saved_ms(top_speed_mm_s: f64, travel_ms: f64, zone_mm: f64, aside_mm: f64) -> [u16; 2] {
     let overlap_ms = circle::overlap_ms(top_speed_mm_s, travel_ms, zone_mm, aside_mm);
     let of_60_ms = (travel_ms / 60.0).min(1.0);
-    [SCATTER_OUT_MS, SCATTER_IN_MS].map(|scatter_ms| (overlap_ms + scatter_ms * of_60_ms) as u16)
+    let [out_ms, in_ms] = [SCATTER_OUT_MS, SCATTER_IN_MS].map(|scatter_ms| overlap_ms + scatter_ms * of_60_ms);
+    [out_ms.min(MOST_SAVED_OUT_MS) as u16, in_ms as u16]
 }
 
 /// The least and the greatest of the leads out, and of the leads in. `None` if none is known.

@@ -10,8 +10,8 @@
 //!
 //! Beside a stem zone the leads are shorter by what the zone's [`circle`] allows at the highest speed, and by the servo's
 //! scatter. The margin pays for that scatter. It is calculated for 1 km/h, where speed gives no slack, and has a fourth
-//! part: stems stand beyond the zone's middle. For a trailing arm it has a fifth part, what the arm carries the tool
-//! along the row.
+//! part: stems stand beyond the zone's middle. For a trailing arm it has a further part, what the arm carries the tool
+//! along the row. For a blade with a length along the row, half of that length is a part.
 //!
 //! The margin covers only measured values: if one is missing there is no sum, and the default margin stays. A few measurements do not show the
 //! worst case, so each scatter has a least value. Times that were measured over another stroke or gap do not count.
@@ -220,6 +220,11 @@ impl SetUp {
         self.timings.iter().copied().filter(|timing| timing.over == over(settings)).collect()
     }
 
+    /// The time of the present stroke in the soil, ms, as an end switch measured it. `None` if none did.
+    pub fn stroke_ms(&self, settings: &Settings) -> Option<f64> {
+        Some(travel_ms(&self.timed(settings))).filter(|&ms| ms > 0.0)
+    }
+
     /// The steps that are missing until the margin can be lowered, in the best order.
     pub fn missing(&self, settings: &Settings) -> Vec<Step> {
         let mut missing = Vec::new();
@@ -280,12 +285,14 @@ impl SetUp {
             let rolled_mm = circle::rolled_mm(top_mm_s, travel_ms(&timings), zone_mm, self.arm.aside_mm(pulse_us));
             self.arm.carried_by_stroke_mm(pulse_us, tool_mm.into(), zone_mm, rolled_mm)
         });
+        let blade_mm = self.arm.blade_length_mm / 2.0;
         let margin = Margin {
             slip_mm,
             servo_mm: f64::from(scatter_ms) * speed_m_s,
             firmware_mm: FIRMWARE_MM * speed_m_s / SPEED_M_S,
             stems_mm: keeps_stems(settings).then_some(STEM_SHARE * zone_mm),
             arm_mm,
+            blade_mm,
             in_use_mm: settings.get(Setting::MarginMm),
         };
         let least_mm = margin.least_mm();
@@ -295,9 +302,10 @@ impl SetUp {
         Err(vec![Step::MeasureAgain(
             least_mm,
             match margin {
-                Margin { servo_mm, .. } if servo_mm > slip_mm.max(arm_mm) => {
+                Margin { servo_mm, .. } if servo_mm > slip_mm.max(arm_mm).max(blade_mm) => {
                     "see to the servo, its times differ too much"
                 }
+                _ if blade_mm > slip_mm.max(arm_mm) => "take a blade that is shorter along the row",
                 _ if arm_mm > slip_mm => "shorten the trailing arm's stroke",
                 _ if second_beam_mm > 0.0 => "roll past more plants",
                 _ => "`set ticks_per_m 0`, and measure the wheel again",

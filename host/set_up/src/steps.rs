@@ -104,6 +104,16 @@ mod tests {
     }
 
     #[test]
+    fn a_step_that_swings_the_tool_at_a_standstill_says_where_to_stand() {
+        let swings = |step: &ManualStep| step.tasks.contains(&Task::TimeServo);
+        let hows: Vec<&str> = steps().iter().filter(|step| swings(step)).map(|step| step.how).collect();
+        assert!(
+            !hows.is_empty() && hows.iter().all(|how| how.contains("no plant is within the tool's reach")),
+            "{hows:?}"
+        );
+    }
+
+    #[test]
     fn text_that_is_no_task_is_not_a_task() {
         for code in ["calibrate", "calibrate much", "servo_out_us", "no_such_setting = 3", "servo_out_us = 99999", ""] {
             assert_eq!(Task::parse(code), None, "{code}");

@@ -1,8 +1,10 @@
 use super::*;
 use rig::settings;
 
+/// The measurements of a session, for a blade without length.
 fn heard(lines: &[&[&str]]) -> SetUp {
-    SetUp::of_lines(lines.concat())
+    let arm = Arm { blade_length_mm: 0.0, ..Arm::default() };
+    SetUp { arm, ..SetUp::of_lines(lines.concat()) }
 }
 
 const TIMED: &[&str] =
@@ -103,7 +105,7 @@ fn beside_a_stem_s_zone_leads_and_margin_go_up_to_its_circle() {
     // and around canopies the 102.5 mm by which 45 degrees carry it.
     let trailing = SetUp { trailing_tool_mm: Some(130), ..set_up.clone() };
     // A longer arm swings farther aside, so its circle saves less.
-    let longer = SetUp { arm: Arm { length_mm: 500.0, ..Arm::default() }, ..set_up.clone() };
+    let longer = SetUp { arm: Arm { length_mm: 500.0, ..set_up.arm }, ..set_up.clone() };
     for (set_up, zone_mm, least_mm, leads) in [
         (&set_up, 0, 22, (158, 52)),
         (&set_up, 100, 21, (127, 72)),
@@ -122,7 +124,7 @@ fn beside_a_stem_s_zone_leads_and_margin_go_up_to_its_circle() {
 #[test]
 fn the_way_back_may_have_no_load_so_its_lead_is_that_of_an_unloaded_servo() {
     let set_up = heard(&[&["servo_out_us=1750"], &["calibrated lead_out_ms=240 lead_in_ms=52 set=yes"; 2]]);
-    let quick = SetUp { arm: Arm { ms_for_90: 120.0, ..Arm::default() }, ..set_up.clone() };
+    let quick = SetUp { arm: Arm { ms_for_90: 120.0, ..set_up.arm }, ..set_up.clone() };
     let settings = settings(&[(Setting::ServoOutUs, 1750), (Setting::StemZoneMm, 110)]);
     for (set_up, in_ms) in [(set_up, 78), (quick, 67)] {
         let leads = [Step::SetLead(Setting::LeadOutMs, 191), Step::SetLead(Setting::LeadInMs, in_ms)];
@@ -263,10 +265,51 @@ fn measurements_are_the_same_after_writing_and_reading() {
     assert_eq!(again.missing(&settings), [Step::MeasureWheel(0)]);
 }
 
+/// A margin without parts of arm and blade.
+const NO_ARM: Margin =
+    Margin { slip_mm: 0.0, servo_mm: 0.0, firmware_mm: 0.0, stems_mm: None, arm_mm: 0.0, blade_mm: 0.0, in_use_mm: 50 };
+
+#[test]
+fn half_of_the_blade_s_length_along_the_row_is_a_part_of_the_margin() {
+    let of = |blade_length_mm: f64, zone_mm: u16| {
+        let mut set_up = heard(&[TIMED, MEASURED, THIRD]);
+        set_up.arm.blade_length_mm = blade_length_mm;
+        let mut changes = worst_leads(Setting::TicksPerM, 1920);
+        if zone_mm > 0 {
+            (changes[0].1, changes[1].1) = (127, 72);
+        }
+        changes.push((Setting::StemZoneMm, zone_mm));
+        set_up.margin(&settings(&changes)).expect("all was measured")
+    };
+    for zone_mm in [0, 100] {
+        let without = of(0.0, zone_mm);
+        assert!(!without.to_string().contains("blade"), "{without}");
+        for (length_mm, half_mm) in [(20.0, 10), (30.0, 15), (44.0, 22)] {
+            let margin = of(length_mm, zone_mm);
+            assert_eq!(margin.least_mm(), without.least_mm() + half_mm);
+            assert!(margin.to_string().contains(&format!(" + blade {half_mm} + ")), "{margin}");
+        }
+    }
+    let mut long = heard(&[TIMED, MEASURED, THIRD]);
+    long.arm.blade_length_mm = 400.0;
+    let next = long.next(&settings(&worst_leads(Setting::TicksPerM, 1920))).expect("there is a step");
+    assert_eq!(next.to_string(), "the measurements need 230 mm: take a blade that is shorter along the row");
+}
+
+#[test]
+fn the_stroke_s_time_is_known_after_a_timing_by_the_end_switch() {
+    let present = settings(&[]);
+    assert_eq!(heard(&[]).stroke_ms(&present), None);
+    assert_eq!(heard(&[&[BY_EYE, "> set lead_out_ms 190", "> set lead_in_ms 50"]]).stroke_ms(&present), None);
+    // 158 ms at most, 52 ms at least, and 40 ms beside the stroke.
+    assert_eq!(heard(&[TIMED]).stroke_ms(&present), Some(66.0));
+    assert_eq!(heard(&[TIMED]).stroke_ms(&settings(&[(Setting::ServoOutUs, 1800)])), None);
+}
+
 #[test]
 fn every_step_fits_on_a_line_of_80_characters() {
     let mm = 123.0;
-    let margin = Margin { slip_mm: mm, servo_mm: mm, firmware_mm: mm, stems_mm: Some(mm), arm_mm: 0.0, in_use_mm: 50 };
+    let margin = Margin { slip_mm: mm, servo_mm: mm, firmware_mm: mm, stems_mm: Some(mm), in_use_mm: 50, ..NO_ARM };
     for step in [
         Step::TimeServo(1),
         Step::SetLead(Setting::LeadOutMs, 158),

@@ -220,6 +220,8 @@ impl<M: Machine> Field<M> {
         }
         let stem_zone_mm = if self.rng.random_bool(0.25) { 90 } else { 0 };
         self.typed = vec![
+            // The stem zone needs it, with the nearest beam.
+            (Setting::TopSpeedMmS, 1150),
             (Setting::BeamToToolMm, machine.beam_to_tool_mm as u16),
             (Setting::SecondBeamMm, machine.second_beam_mm as u16),
             (Setting::StemZoneMm, stem_zone_mm),

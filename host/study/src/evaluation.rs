@@ -82,7 +82,8 @@ impl Analysis {
     /// Analyses the plots of a trial.
     ///
     /// # Errors
-    /// If there is no plot, an invalid one, or a replication of a treatment twice. A measure without a model has a [`NoModel`] instead.
+    /// If there is no plot, none that is filled in, an invalid one, or a replication of a treatment twice. A measure without
+    /// a model has a [`NoModel`] instead.
     pub fn of(records: Vec<PlotRecord>) -> Result<Self> {
         Self::at_speeds(records, &[])
     }
@@ -113,6 +114,11 @@ impl Analysis {
         for record in &records {
             record.check().map_err(|problem| anyhow!("plot {}: {problem}", record.plot))?;
         }
+        let all = records.len();
+        ensure!(
+            !records.iter().all(PlotRecord::is_blank),
+            "{all} of {all} plots are not filled in: enter what was counted"
+        );
         let replications = records.iter().zip(&levels_km_h).map(|(of, level)| (of.replication, *level, of.spacing_cm));
         for ((replication, speed, spacing), plots) in grouped(replications.zip(records.iter().map(|of| of.plot))) {
             if let [first, second, ..] = plots.as_slice() {

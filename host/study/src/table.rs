@@ -80,9 +80,13 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     if value < 0.0 && !is_zero { format!("\u{2212}{digits}") } else { digits }
 }
 
-/// A number with `decimals` decimal places. A small one has two significant digits instead, so that it never reads as 0.
+/// Smaller numbers are rounding errors of 0.
+const ROUNDING: f64 = 1e-12;
+
+/// A number with `decimals` decimal places. A small one has two significant digits instead. Only a rounding error reads
+/// as 0.
 pub fn visible(value: f64, decimals: usize) -> String {
-    let places = if value == 0.0 { 0.0 } else { 1.0 - value.abs().log10().floor() };
+    let places = if value.abs() < ROUNDING { 0.0 } else { 1.0 - value.abs().log10().floor() };
     let reads_as_0 = value.abs() < 0.5 * 0.1_f64.powi(decimals as i32);
     fixed(value, if reads_as_0 { decimals.max(places as usize) } else { decimals })
 }
@@ -93,14 +97,16 @@ pub fn short(value: f64) -> String {
     digits.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-/// A number with four significant digits, or more before the point, and at most five decimal places.
+/// A number with four significant digits, or more before the point. From 0.00001 on it has at most five decimal places. A
+/// rounding error of zero reads as 0.
 pub fn significant(value: f64) -> String {
     const DIGITS: f64 = 4.0;
     const DECIMALS: f64 = 5.0;
-    if value.abs() < 0.1_f64.powf(DECIMALS) {
+    if value.abs() < ROUNDING {
         return "0".to_owned();
     }
-    fixed(value, (DIGITS - 1.0 - value.abs().log10().floor()).clamp(0.0, DECIMALS) as usize)
+    let places = (DIGITS - 1.0 - value.abs().log10().floor()).max(0.0);
+    fixed(value, if value.abs() < 0.1_f64.powf(DECIMALS) { places } else { places.min(DECIMALS) } as usize)
 }
 
 /// A p-value. Values below a thousandth are shown as such.
@@ -126,11 +132,12 @@ mod tests {
         assert_eq!(short(120.0), "120");
         assert_eq!(significant(0.012_345_6), "0.01235");
         assert_eq!(significant(12_345.6), "12346");
+        assert_eq!(significant(-0.000_000_123_456), "\u{2212}0.0000001235");
         assert_eq!(significant(-1e-17), "0");
         assert_eq!(probability(0.000_4), "< 0.001");
         assert_eq!(optional(None, short), NOTHING);
-        let small = [(0.0, 1), (0.06, 1), (0.0219, 1), (0.004, 2), (0.006, 2), (4.56e-8, 1)];
+        let small = [(0.0, 1), (1e-15, 1), (0.06, 1), (0.0219, 1), (0.004, 2), (0.006, 2), (4.56e-8, 1)];
         let shown = small.map(|(value, decimals)| visible(value, decimals));
-        assert_eq!(shown, ["0.0", "0.1", "0.022", "0.0040", "0.01", "0.000000046"]);
+        assert_eq!(shown, ["0.0", "0.0", "0.1", "0.022", "0.0040", "0.01", "0.000000046"]);
     }
 }

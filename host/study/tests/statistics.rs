@@ -243,6 +243,14 @@ fn too_few_plots_for_the_parameters_are_refused() {
 }
 
 #[test]
+fn plots_with_a_measured_speed_each_are_refused_where_their_analysis_would_take_long() {
+    let plots: Vec<(f64, f64)> = (0..5000).map(|plot| (1.0 + f64::from(plot) / 2500.0, 50.0)).collect();
+    let values: Vec<f64> = (0..5000).map(|plot| f64::from(plot % 7)).collect();
+    let (model, variance) = refusals(&plots, &values);
+    assert_eq!((model, variance), (None, Some(NoModel::TooManyTreatments { treatments: 5000, most: 200 })));
+}
+
+#[test]
 fn a_constant_factor_is_left_out_with_a_remark() {
     for (factor, remark) in [("spacing", Remark::OneSpeed), ("speed", Remark::OneSpacing)] {
         let plot = |wide: f64| if factor == "spacing" { (1.0, 50.0 + wide) } else { (1.0 + wide, 50.0) };

@@ -87,6 +87,7 @@ impl Novice {
                     self.measured.take_line(&format!("slip permille={permille}"));
                 }
                 let machine = &self.conditions.machine;
+                self.measured.arm.blade_length_mm = machine.tool_length_mm;
                 self.measured.trailing_tool_mm =
                     (machine.arm == Arm::Trailing).then_some(machine.tool_width_mm.ceil() as u16);
                 if let Ok(margin) = self.measured.margin(&self.settings()) {

@@ -68,7 +68,10 @@ export class Connection {
 
     /** Opens a port and talks to its machine: `isBack` if the operator has not chosen it again. */
     async connect(port: SerialPort, isBack = false): Promise<void> {
-        if (this.#isBusy) return;
+        while (this.#isBusy) {
+            if (isBack) return;
+            await wait(AGAIN_MS / 10);
+        }
         this.#isBusy = true;
         await this.#attempt(async () => {
             // A browser may give the same machine another port.
@@ -77,6 +80,8 @@ export class Connection {
             // Also where it does not open: its next cable is then noticed.
             this.#port = port;
             const line = await SerialLine.open(port, BAUD);
+            // It was released meanwhile.
+            if (this.#port !== port) return line.close();
             this.#isOpen = true;
             if (!isBack) this.panel.forget();
             const now = performance.now();

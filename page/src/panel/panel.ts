@@ -255,7 +255,10 @@ export class Panel {
     #take(happening: Happening): void {
         const { alarm, restarted } = this.machine;
         if (happening.is === "connected") {
-            if (this.mayBeOther && !isSame(happening.settings, this.machine.settings)) this.#forgetTyped();
+            if (this.mayBeOther && !isSame(happening.settings, this.machine.settings)) {
+                this.machine.restarted = undefined;
+                this.#forgetTyped();
+            }
             this.mayBeOther = false;
         }
         this.machine.take(happening, this.#now);

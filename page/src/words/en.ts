@@ -247,7 +247,7 @@ export const words = {
     servoTime:
         "Time it with the tool in the soil. Without an end switch, film it: the lamp is lit while the tool is commanded out.",
     swingSix: "Swing six times",
-    swingsSix: "The tool swings in and out six times. Keep clear of it.",
+    swingsSix: "The tool swings in and out six times. Stop the machine where it reaches no plant, and keep clear of it.",
     timedSet: "The end switch has timed it, and both leads are set. Not saved yet.",
     timedNotSet:
         "The end switch has timed it, but these leads need the beam farther ahead, or a lower top speed: nothing is set.",
@@ -457,8 +457,8 @@ export const heard = {
     lowerMargin: "lower the margin: `set margin_mm {margin}`: {sum}",
     raiseMargin: "raise the margin: `set margin_mm {margin}`: {sum}",
     marginReady: "the margin pays for {sum}: `save`",
-    sumCanopy: "slip {slip} + servo {servo} + {firmware} mm at {speed} km/h",
-    sumStem: "slip {slip} + servo {servo} + stem {stem} + {firmware} mm",
+    sumCanopy: "slip {slip} + servo {servo} + blade {blade} + {firmware} mm at {speed} km/h",
+    sumStem: "slip {slip} + servo {servo} + blade {blade} + stem {stem} + {firmware} mm",
     marginTooSmall: "margin_mm {now} is too small: {why}",
     measuredNeeds: "the measurements need {least}",
     measureAgain: "the measurements need {least} mm: {how}",

@@ -6,22 +6,23 @@
 //!
 //! A script keeps its order, because it may set values and then hold. But if an answer does not come, a `hold` behind it
 //! goes first, and the lines between are not sent. At the start, lines wait until each row was tried; a `hold` that is
-//! first does not. An output or a log that fails does not end the session before the input: a `hold` may still come.
+//! first does not. An output or a log that fails does not end the session before the input: a `hold` may still come. An
+//! output that takes nothing, such as a stopped terminal, delays no `hold`: a thread of its own prints.
 
 use super::addressed;
 use crate::input::{self, Line};
 use crate::ports::Chosen;
 use crate::record::Logs;
-use anyhow::{Result, ensure};
-use frame::{Finding, print_to, tell};
+use anyhow::{Error, Result, ensure};
+use frame::{Finding, Printed, printing_aside};
 use link::advice;
 use link::examples::Heading;
 use link::rows::{Heard, Hold, Rows, What};
 use link::session::{HOLD, Happening};
 use link::settings::other_version;
 use std::collections::VecDeque;
-use std::io::{self, Write};
-use std::sync::mpsc::{Receiver, TryRecvError};
+use std::io;
+use std::sync::mpsc::{Receiver, Sender, TryRecvError};
 use std::time::{Duration, Instant};
 
 /// Lines that are read ahead. The others wait in the pipe.
@@ -43,7 +44,7 @@ const LONGEST_REPORT: Duration = Duration::from_secs(2);
 /// `connected` is there, and the others may not be tried yet. Fails if a line was not sent, an Uno goes away with
 /// commands unanswered, or output or log fail.
 pub fn run(rows: &Rows, connected: usize, chosen: &Chosen, logs: Option<Logs>) -> Result<Finding> {
-    Talk::new(rows, connected, chosen, logs).run(&input::typed(), &mut io::stdout().lock())
+    printing_aside(&mut io::stdout(), |lines| Talk::new(rows, connected, chosen, logs, lines).run(&input::typed()))
 }
 
 /// How a row stands.
@@ -75,13 +76,13 @@ struct Talk<'a> {
     unsent: Vec<String>,
     /// Whether the last line named a row only. A shell may split `left: start`, and `start` is not for all.
     is_split: bool,
-    /// Whether all could be printed.
-    is_printed: bool,
+    /// The lines to print.
+    lines: Sender<Printed>,
     finding: Finding,
 }
 
 impl<'a> Talk<'a> {
-    fn new(rows: &'a Rows, connected: usize, chosen: &'a Chosen, logs: Option<Logs>) -> Self {
+    fn new(rows: &'a Rows, connected: usize, chosen: &'a Chosen, logs: Option<Logs>, lines: Sender<Printed>) -> Self {
         let is_there = |row| (row == connected).then_some(true);
         let standing = |row| Standing { is_there: is_there(row), ..Standing::default() };
         let standing = (0..rows.count()).map(standing).collect();
@@ -95,12 +96,12 @@ impl<'a> Talk<'a> {
             hold: None,
             unsent: Vec::new(),
             is_split: false,
-            is_printed: true,
+            lines,
             finding: Finding::Good,
         }
     }
 
-    fn run(mut self, commands: &Receiver<Line>, output: &mut impl Write) -> Result<Finding> {
+    fn run(mut self, commands: &Receiver<Line>) -> Result<Finding> {
         let mut has_all = false;
         loop {
             while !has_all && self.waiting.len() < READ_AHEAD {
@@ -124,7 +125,7 @@ impl<'a> Talk<'a> {
             };
             if let Some(line) = next {
                 self.moved_at = Instant::now();
-                self.command(&line, output);
+                self.command(&line);
             }
             let ended = has_all && self.waiting.is_empty();
             // Two statuses after a command, all its events have come.
@@ -134,7 +135,7 @@ impl<'a> Talk<'a> {
                 return self.end();
             }
             let Some(heard) = self.rows.next(LOOK) else { continue };
-            self.take(&heard, ended, output)?;
+            self.take(&heard, ended)?;
         }
     }
 
@@ -149,7 +150,6 @@ impl<'a> Talk<'a> {
         ensure!(failed.is_empty(), "not all was answered by {}", failed.join(", "));
         let lines = if self.unsent.len() == 1 { "line" } else { "lines" };
         ensure!(self.unsent.is_empty(), "not sent: {lines} {}", self.unsent.join(", "));
-        ensure!(self.is_printed, "not all could be printed");
         self.logs.as_ref().map_or(Ok(()), Logs::check)?;
         Ok(self.finding)
     }
@@ -169,22 +169,24 @@ impl<'a> Talk<'a> {
     }
 
     fn refuse(&mut self, line: &Line, why: &str) {
-        tell!("error: line {} was not sent: {why}", line.number);
+        self.tell(format!("error: line {} was not sent: {why}", line.number));
         self.unsent.push(line.number.to_string());
     }
 
-    /// Prints a line, unless an earlier one has failed.
-    fn print(&mut self, line: &str, output: &mut impl Write) {
-        if self.is_printed
-            && let Err(error) = print_to(output, format_args!("{line}\n"))
-        {
-            tell!("error: {error:#}");
-            self.is_printed = false;
-        }
+    /// Has a line printed.
+    fn print(&self, line: String) {
+        // The thread that prints is gone only after a panic, which the end reports.
+        let _ = self.lines.send(Printed::Result(line));
+    }
+
+    /// Has a message printed beside the result.
+    fn tell(&self, message: String) {
+        // As above.
+        let _ = self.lines.send(Printed::Message(message));
     }
 
     /// Types a line to the addressed rows. A line that cannot be sent is reported, and the next one may be `hold`.
-    fn command(&mut self, line: &Line, output: &mut impl Write) {
+    fn command(&mut self, line: &Line) {
         let names = self.chosen.names();
         let (to, command) = match addressed(&line.text, &names, None) {
             // The machine does not answer a line without a word.
@@ -211,7 +213,7 @@ impl<'a> Talk<'a> {
             let standing = &mut self.standing[row];
             if standing.is_there == Some(false) {
                 standing.has_failed = true;
-                self.print(&self.chosen.under_name(row, "error: the row is not there"), output);
+                self.print(self.chosen.under_name(row, "error: the row is not there"));
                 if link::is_hold(command) {
                     self.rows.hold(row);
                 }
@@ -221,23 +223,22 @@ impl<'a> Talk<'a> {
             standing.statuses = 0;
             self.rows.command(row, command);
         }
-        self.report_hold(output);
+        self.report_hold();
     }
 
-    fn take(&mut self, heard: &Heard, ended: bool, output: &mut impl Write) -> Result<()> {
+    fn take(&mut self, heard: &Heard, ended: bool) -> Result<()> {
         let row = heard.row;
-        let standing = &mut self.standing[row];
-        if let Some(logs) = &mut self.logs {
-            let written = logs.take(heard);
-            // It prints the error. The session goes on, even without any log.
-            let _ = logs.go_on_after(written, row, self.chosen);
+        // The session goes on, even without any log.
+        if let Some(Err(error)) = self.logs.as_mut().map(|logs| logs.take(heard)) {
+            self.tell(format!("error: {}", self.chosen.under_name(row, &format!("{:#}", Error::from(error)))));
         }
+        let standing = &mut self.standing[row];
         let mut said = None;
         match &heard.what {
             What::Happened(Happening::Connected { version, shown, .. }) => {
                 standing.is_there = Some(true);
                 if let Some(other) = other_version(version, shown) {
-                    tell!("{}", self.chosen.under_name(row, &other));
+                    self.tell(self.chosen.under_name(row, &other));
                 }
             }
             What::Happened(Happening::Status(..)) => standing.statuses += 1,
@@ -252,7 +253,7 @@ impl<'a> Talk<'a> {
                 standing.has_failed |= !was_idle;
                 (standing.is_there, standing.unanswered) = (Some(false), Vec::new());
                 ensure!(self.chosen.are_several || was_idle && !ended, "{why}");
-                tell!("{}", self.chosen.under_name(row, why));
+                self.tell(self.chosen.under_name(row, why));
             }
             What::Happened(Happening::Event(_, line)) => said = Some(line.clone()),
             What::Happened(Happening::Answer(line)) => {
@@ -260,7 +261,7 @@ impl<'a> Talk<'a> {
                 self.moved_at = Instant::now();
                 // The lines on standard output are the machine's own.
                 if let Some(head) = standing.heading.before(line) {
-                    tell!("{}", self.chosen.under_name(row, head));
+                    self.tell(self.chosen.under_name(row, head));
                 }
                 said = Some(line.clone());
             }
@@ -278,193 +279,22 @@ impl<'a> Talk<'a> {
             }
         }
         if let Some(line) = said {
-            self.print(&self.chosen.under_name(row, &line), output);
+            self.print(self.chosen.under_name(row, &line));
         }
         if let Some(hold) = &mut self.hold {
             hold.take(heard);
         }
-        self.report_hold(output);
+        self.report_hold();
         Ok(())
     }
 
     /// Prints the result of a `hold` to all rows, once no row is left to answer.
-    fn report_hold(&mut self, output: &mut impl Write) {
+    fn report_hold(&mut self) {
         if let Some(hold) = self.hold.take_if(|hold| hold.is_over()) {
-            self.print(&hold.summary(&self.chosen.names()), output);
+            self.print(hold.summary(&self.chosen.names()));
         }
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use link::connection::Opener;
-    use link::row_names::{Board, Row};
-    use link::{LinkError, Wire};
-    use rig::ScriptedBoard;
-    use std::io::{ErrorKind, Read};
-    use std::sync::atomic::{AtomicBool, Ordering};
-    use std::sync::{Arc, mpsc};
-    use std::thread;
-
-    /// A board whose status has a word that this program does not know, while the flag is set.
-    struct Newer<P>(P, Arc<AtomicBool>);
-
-    impl<P: Read> Read for Newer<P> {
-        fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-            let count = self.0.read(buffer)?;
-            if self.1.load(Ordering::Relaxed) {
-                let text = String::from_utf8_lossy(&buffer[..count]).replace("state=hold", "state=park");
-                buffer[..count].copy_from_slice(text.as_bytes());
-            }
-            Ok(count)
-        }
-    }
-
-    impl<P: Write> Write for Newer<P> {
-        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-            self.0.write(bytes)
-        }
-
-        fn flush(&mut self) -> io::Result<()> {
-            self.0.flush()
-        }
-    }
-
-    /// The only row, whose port is at this board.
-    fn only_row(open: Opener) -> (Rows, Chosen) {
-        let (rows, first_tries) = Rows::open(vec![open]);
-        assert!(first_tries.recv().unwrap().1.is_none());
-        let row = Row { name: "Uno".to_owned(), board: Board::Only { beside: None } };
-        (rows, Chosen { rows: vec![row], are_several: false })
-    }
-
-    #[test]
-    fn a_session_ends_without_a_status_that_it_knows() {
-        let (ended, end) = mpsc::channel();
-        thread::spawn(move || {
-            let port = ScriptedBoard::plugged_in();
-            let is_parked = Arc::new(AtomicBool::new(false));
-            let flag = Arc::clone(&is_parked);
-            let (rows, chosen) = only_row(Box::new(move || {
-                let port = port.open().ok_or(LinkError::Absent("it".to_owned()))?;
-                Ok(Wire::over(Newer(port, Arc::clone(&flag)), false))
-            }));
-            is_parked.store(true, Ordering::Relaxed);
-            let (sender, commands) = mpsc::sync_channel(1);
-            sender.send(Line { number: 1, text: "status".to_owned() }).unwrap();
-            drop(sender);
-            let mut output = Vec::new();
-            let finding = Talk::new(&rows, 0, &chosen, None).run(&commands, &mut output).unwrap();
-            ended.send((finding, String::from_utf8(output).unwrap())).unwrap();
-        });
-        let (finding, output) = end.recv_timeout(Duration::from_secs(30)).expect("it ends");
-        assert_eq!(finding, Finding::Good);
-        assert!(output.contains("state=park"), "{output}");
-    }
-
-    /// An output that fails this way.
-    struct Failing(ErrorKind);
-
-    impl Write for Failing {
-        fn write(&mut self, _: &[u8]) -> io::Result<usize> {
-            Err(self.0.into())
-        }
-
-        fn flush(&mut self) -> io::Result<()> {
-            Ok(())
-        }
-    }
-
-    /// Opens the port of this board.
-    fn opener(board: &ScriptedBoard) -> Opener {
-        let port = board.clone();
-        Box::new(move || Ok(Wire::over(port.open().ok_or(LinkError::Absent("it".to_owned()))?, false)))
-    }
-
-    /// A session with this board and this input.
-    fn talk(board: &ScriptedBoard, input: &[&str], output: &mut impl Write) -> Result<Finding> {
-        let (rows, chosen) = only_row(opener(board));
-        let (sender, commands) = mpsc::sync_channel(9);
-        for (number, text) in (1..).zip(input) {
-            sender.send(Line { number, text: (*text).to_owned() }).unwrap();
-        }
-        drop(sender);
-        Talk::new(&rows, 0, &chosen, None).run(&commands, output)
-    }
-
-    #[test]
-    fn a_hold_is_typed_though_nothing_can_be_printed() {
-        // A reader that has closed the pipe has read enough.
-        for (kind, finding) in [(ErrorKind::BrokenPipe, Some(Finding::Good)), (ErrorKind::StorageFull, None)] {
-            let board = ScriptedBoard::plugged_in();
-            let ended = talk(&board, &["get k", "hold"], &mut Failing(kind));
-            assert_eq!(ended.ok(), finding, "{kind}");
-            assert_eq!(board.typed()[..3], ["events on", "get k", "hold"]);
-        }
-    }
-
-    #[test]
-    fn a_command_that_a_shell_splits_from_its_row_is_not_sent() {
-        let board = ScriptedBoard::plugged_in();
-        let ended = talk(&board, &["Uno:", "", "test", "start", "Uno: clear", "Uno:", "hold"], &mut Vec::new());
-        assert_eq!(ended.unwrap_err().to_string(), "not sent: lines 1, 3, 4, 6");
-        assert_eq!(board.typed()[..3], ["events on", "clear", "hold"]);
-    }
-
-    #[test]
-    fn one_answer_ends_every_hold_before_it() {
-        let (rows, chosen) = only_row(opener(&ScriptedBoard::plugged_in()));
-        let mut talk = Talk::new(&rows, 0, &chosen, None);
-        for (number, text) in [(1, "hold"), (2, "Hold!")] {
-            talk.command(&Line { number, text: text.to_owned() }, &mut Vec::new());
-        }
-        assert!(!talk.is_idle());
-        let what = What::Happened(Happening::Answered { number: 1, command: "hold".to_owned(), refusal: None });
-        talk.take(&Heard { row: 0, at: Instant::now(), what }, false, &mut Vec::new()).unwrap();
-        assert!(talk.is_idle());
-    }
-
-    #[test]
-    fn a_hold_reaches_the_rows_that_are_there_while_another_is_not_open_yet() {
-        let (gate, closed) = mpsc::channel::<()>();
-        let absent: Opener = Box::new(move || {
-            // An error too: the gate is open.
-            let _ = closed.recv();
-            Err(LinkError::Absent("it".to_owned()))
-        });
-        let board = ScriptedBoard::plugged_in();
-        let (rows, first_tries) = Rows::open(vec![opener(&board), absent]);
-        assert_eq!(first_tries.recv().unwrap().0, 0);
-        let row = |name: &str| Row { name: name.to_owned(), board: Board::Only { beside: None } };
-        let chosen = Chosen { rows: vec![row("left"), row("s\u{fc}d")], are_several: true };
-        let (sender, commands) = mpsc::sync_channel(2);
-        for (number, text) in [(1, "hold"), (2, "left: clear")] {
-            sender.send(Line { number, text: text.to_owned() }).unwrap();
-        }
-        drop(sender);
-        let talk = thread::spawn(move || {
-            let mut output = Vec::new();
-            let ended = Talk::new(&rows, 0, &chosen, None).run(&commands, &mut output);
-            (ended.unwrap_err().to_string(), String::from_utf8(output).unwrap())
-        });
-        let has_held = (0..30_000).any(|_| {
-            thread::sleep(Duration::from_millis(1));
-            board.typed().contains(&"hold".to_owned())
-        });
-        assert!(has_held && !board.typed().contains(&"clear".to_owned()), "{:?}", board.typed());
-        drop(gate);
-        let (error, output) = talk.join().unwrap();
-        assert_eq!(error, "not all was answered by s\u{fc}d");
-        assert!(output.contains("HOLD 1 of 2 in ") && output.contains("NOT THERE: s\u{fc}d"), "{output}");
-        assert!(board.typed().contains(&"clear".to_owned()), "{:?}", board.typed());
-    }
-
-    #[test]
-    fn a_hold_goes_before_an_answer_that_does_not_come() {
-        let board = ScriptedBoard::plugged_in();
-        assert!(talk(&board, &["clear", "silence", "clear", "Hold!"], &mut Vec::new()).is_err());
-        assert_eq!(board.typed()[..4], ["events on", "clear", "silence", "hold"]);
-        assert!(!board.typed()[4..].contains(&"clear".to_owned()));
-    }
-}
+mod tests;

@@ -46,7 +46,7 @@ impl Guide {
                 return self.push(&leads);
             };
             say!("  Next, {step}")?;
-            self.go("Keep clear of the tool")?;
+            self.go("Stop the machine where no plant is within the tool's reach. Keep clear of the tool")?;
             let from = self.stands_at(None)?;
             if self.ask("calibrate servo")?.is_none() {
                 continue;
@@ -64,6 +64,12 @@ impl Guide {
                 }
                 EventLine::CalibratedBySwitch { out_ms, in_ms, is_set } => {
                     say!("  The tool was out after {out_ms} ms, and began to come back after {in_ms} ms.")?;
+                    if !Setting::LeadOutMs.allows(out_ms) || !Setting::LeadInMs.allows(in_ms) {
+                        bail!(
+                            "the firmware takes leads of up to {} ms: take a faster servo or valve, or a shorter stroke",
+                            Setting::LeadOutMs.greatest()
+                        );
+                    }
                     if !is_set {
                         bail!(
                             "a lead of {out_ms} ms needs the beam farther ahead, or a lower top_speed_mm_s: change one of them"

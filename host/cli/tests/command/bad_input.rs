@@ -37,10 +37,15 @@ fn a_machine_that_strays_into_its_sweeps_gets_a_warning_from_each_command_that_w
             assert!(!warns || message.contains("Set machine.sweep_from_mm to 65 or more."), "{command}: {message}");
         }
     }
-    // The axis may have the value.
-    let words = ["sweep", "--x", "driving.steering_mm=0..20:20", "--field", "from-the-box"];
-    let message = String::from_utf8_lossy(&weeder(folder.path(), &words).stderr).into_owned();
-    assert!(message.contains("driving.steering_mm is 20, but the sweeps leave 0.0 mm"), "{message}");
+    // The axis or the change may have the value.
+    for command in [
+        "sweep --x driving.steering_mm=0..20:20",
+        "sensitivity --replications 1 --speeds 1 crop.canopy_mm=160 driving.steering_mm=20",
+    ] {
+        let words: Vec<&str> = command.split(' ').chain(["--field", "from-the-box"]).collect();
+        let message = String::from_utf8_lossy(&weeder(folder.path(), &words).stderr).into_owned();
+        assert!(message.contains("driving.steering_mm is 20, but the sweeps leave 0.0 mm"), "{command}: {message}");
+    }
 }
 
 #[test]

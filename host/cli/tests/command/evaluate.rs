@@ -112,16 +112,23 @@ fn a_log_gives_each_plot_its_speed_and_what_the_table_leaves_empty() {
         now_ms += 60_000;
     }
     fs::write(folder.path().join("row.csv"), &log).unwrap();
-    let said = said(folder.path(), &["evaluate", "trial.csv", "--log", "row.csv", "--out", "report"]);
+    let words = said(folder.path(), &["evaluate", "trial.csv", "--log", "row.csv", "--out", "report"]);
     let page = fs::read_to_string(folder.path().join("report/report.html")).unwrap();
-    let table: Vec<Vec<&str>> = said.lines().map(|line| line.split_whitespace().collect()).collect();
+    let table: Vec<Vec<&str>> = words.lines().map(|line| line.split_whitespace().collect()).collect();
     for row in [
         ["1", "5", "to", "127", "60.0", "30.00", "1.80", "59"],
         ["2", "128", "to", "250", "30.0", "30.00", "3.60", "60"],
     ] {
-        assert!(table.iter().any(|cells| cells.get(1..9) == Some(&row[..])), "{row:?} is not in\n{said}");
+        assert!(table.iter().any(|cells| cells.get(1..9) == Some(&row[..])), "{row:?} is not in\n{words}");
     }
     assert!(page.contains("lines of the log") && page.contains("row.csv"), "the report has the log's table");
+    // In the morning the counts are not in yet, and with a log there is something to judge.
+    let empty = format!("{HEADER}1,1.8,50,,,,,,,0.4,2.5\n1,3.6,50,,,,,,,0.4,2.5\n");
+    fs::write(folder.path().join("empty.csv"), empty).unwrap();
+    let efficiency = said(folder.path(), &["evaluate", "empty.csv", "--log", "row.csv"]);
+    assert!(efficiency.contains("FIELD EFFICIENCY, %"), "{efficiency}");
+    let none = "empty.csv: 2 of 2 plots are not filled in: enter what was counted";
+    assert_refused(folder.path(), &["evaluate", "empty.csv"], none);
     let one = ["evaluate", "trial.csv", "--log", "row.csv", "--plots", "1"];
     assert_refused(folder.path(), &one, "stretches of work in the log: 2, plots: 1. Say which plot each stretch is");
     let labelled = format!("plot,{HEADER}P1,1,1.8,50,100,12,,0,,,0.4,2.5\nP2,1,3.6,50,100,18,,1,,,0.4,2.5\n");

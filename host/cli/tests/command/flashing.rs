@@ -250,6 +250,16 @@ fn released_firmware_comes_from_a_command_that_proves_it() {
 }
 
 #[test]
+fn a_release_has_the_packages_of_the_page_s_present_lock() {
+    let [release, setup] =
+        ["release.sh", "setup.sh"].map(|file| fs::read_to_string(firmware::workspace_root().join(file)).unwrap());
+    let installs: Vec<&str> = release.lines().filter(|line| line.contains("npm --prefix page ci")).collect();
+    let [install] = installs[..] else { panic!("{installs:?}") };
+    assert!(install.contains("[ page/package-lock.json -nt \"$lock\" ]"), "{install}");
+    assert!(setup.lines().any(|line| line.trim() == install), "setup.sh installs them in the same case");
+}
+
+#[test]
 fn a_row_is_flashed_by_its_name() {
     let folder = tempfile::tempdir().unwrap();
     let mut pty = Pty::open().unwrap();

@@ -45,7 +45,7 @@ fn a_plan_is_refused_while_it_is_empty_and_an_empty_cell_is_named() {
     let folder = TempDir::new().unwrap();
     said(folder.path(), &["plan", "--width", "0.4", "--power", "2.5", "--out", "trial.csv", "--sheets", "sheets.html"]);
     assert_eq!(fs::read_to_string(folder.path().join("sheets.html")).unwrap().matches("<section>").count(), 24);
-    let none = "trial.csv, line 6: 24 of 24 plots are not filled in: enter what was counted";
+    let none = "trial.csv: 24 of 24 plots are not filled in: enter what was counted";
     assert_refused(folder.path(), &["evaluate", "trial.csv"], none);
     let path = folder.path().join("trial.csv");
     let filled = filled_in(&fs::read_to_string(&path).unwrap());

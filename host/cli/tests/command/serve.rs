@@ -303,6 +303,32 @@ fn a_pulled_port_is_reported_and_opened_again_and_the_other_machine_works_on() {
 }
 
 #[test]
+#[cfg(target_os = "linux")]
+fn an_output_that_takes_nothing_delays_neither_hold_nor_the_end() {
+    let folder = folder();
+    let (_uno, port) = uno(&folder, "uno", &["--stand"]);
+    // As full as a stopped terminal: a pipe that no program reads.
+    let (_unread, full) = std::io::pipe().expect("there are pipes");
+    let fill = ["if=/dev/zero", "of=/dev/stdout", "bs=4096", "oflag=nonblock"];
+    let filled =
+        Command::new("dd").args(fill).env("LC_ALL", "C").stdout(full.try_clone().expect("it is open")).output();
+    let said = String::from_utf8_lossy(&filled.expect("there is dd").stderr).into_owned();
+    assert!(said.contains("temporarily unavailable"), "it is not full: {said}");
+    let mut command = weeder();
+    command.arg("serve");
+    let served = serve_telling(full.into(), command, &folder, &[&port], &LAN);
+    // The machine's thread has told that it is there.
+    served.make_ready(0);
+    // The server's thread tells of both.
+    assert_eq!(served.try_code("00000000").0, 403);
+    let phone = served.pair();
+    assert_eq!(served.command(&served.here, "", "start").0, 200);
+    assert_eq!(served.command(&served.lan, &phone, "hold"), (200, "ok\n".to_owned()));
+    Events::open(&served.lan, &phone, 0).wait_for(|message| has(message, "said", "state=hold"));
+    served.process.interrupt();
+}
+
+#[test]
 fn a_machine_that_is_not_there_is_waited_for() {
     let folder = folder();
     let port = folder.path().join("uno");

@@ -316,6 +316,7 @@ fn a_person_sets_the_virtual_uno_up_from_the_first_question_to_the_last() {
         "Step 4 of 8, Fit a second beam: done",
         "servo_out_us in us, now 2000 [1750]",
         "The measurements ask for ",
+        " + blade 10 + ",
         "    stem_zone_mm 110 mm\n",
         "Next, read docs/work.md",
     ] {
@@ -335,7 +336,8 @@ fn a_person_sets_the_virtual_uno_up_from_the_first_question_to_the_last() {
     assert!((2005..=2016).contains(&value(Setting::TicksPerM)), "{json:#}");
     assert!((95..=155).contains(&value(Setting::LeadOutMs)), "{json:#}");
     assert!((60..=100).contains(&value(Setting::LeadInMs)), "{json:#}");
-    assert!((20..=30).contains(&value(Setting::MarginMm)), "{json:#}");
+    // The 22 mm of the simulated machine, other measurements, and half of a blade of 20 mm.
+    assert!((30..=40).contains(&value(Setting::MarginMm)), "{json:#}");
 
     // A second board is empty, and the file is not its own.
     let (_other, _) = uno(folder.path(), &["--stand", "--link", "other"]);
@@ -358,14 +360,14 @@ fn without_a_machine_s_file_its_measures_are_asked_and_nothing_else_is_offered()
     let mut input = vec!["", "s", "", "300", "", "", "", "2000", "90", "s"];
     // Step 5 by a person's own measures, one of them out of range at first.
     input.extend([
-        "maybe", "", "", "300", "20", "2.5", "0.3", "40", "0.2", "800", "900", "80", "20", "15", "", "", "", "", "",
-        "s", "s", "s",
+        "maybe", "", "", "300", "20", "25", "2.5", "0.3", "40", "0.2", "800", "900", "80", "20", "15", "", "", "", "",
+        "", "s", "s", "s",
     ]);
     let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
     command.current_dir(&folder).args(["set-up", "--port", "./uno"]);
     let printed = printed(&typed(&mut command, input.join("\n") + "\n"), 0);
     let machine = "[intra_row]\nwidth = \"90 mm\"\nshank_length = \"300 mm\"\nshank_diameter = \"20 mm\"\n\
-        blade_height = \"2.5 mm\"\nblade_mass = \"0.3 kg\"\nservo_torque = \"40 kg cm\"\n[swing]\nservo_time_60 = \"0.2 s\"\npulse_for_90 = 800\nprotected = \"80 mm\"\n\
+        blade_base = \"25 mm\"\nblade_height = \"2.5 mm\"\nblade_mass = \"0.3 kg\"\nservo_torque = \"40 kg cm\"\n[swing]\nservo_time_60 = \"0.2 s\"\npulse_for_90 = 800\nprotected = \"80 mm\"\n\
         stem_off = \"20 mm\"\nroom = \"15 mm\"\n";
     fs::write(folder.path().join("my.toml"), machine).expect("there is room for a file");
     let design = said(folder.path(), &["design", "--machine", "my.toml"]);

@@ -328,7 +328,11 @@ fn parameters() -> String {
     let mut list = String::new();
     for (parameter, default) in Conditions::default().values() {
         let Parameter { name, meaning, source, .. } = parameter;
-        let (default, range) = (parameter.written(default), parameter.range());
+        let quoted = |words: String| match parameter.words {
+            [] => words,
+            _ => words.split(" or ").map(|word| format!("\"{word}\"")).collect::<Vec<_>>().join(" or "),
+        };
+        let (default, range) = (quoted(parameter.written(default)), quoted(parameter.range()));
         writeln!(list, "- `{name}` = {default} ({range}): {meaning}. Source: {source}.")
             .expect("a string takes everything");
     }

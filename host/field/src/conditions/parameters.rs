@@ -169,11 +169,12 @@ parameters! {
     }
     /// The machine.
     machine: Mechanism {
-        beam_to_tool_mm: f64 = 400.0, 100 to 2000, "X, from the beam back to the tool", "assumed: the paper does not say it";
+        beam_to_tool_mm: f64 = 400.0, 100 to 2000, "X, from the beam back to the tool's middle along the row", "assumed: the paper does not say it";
         second_beam_mm: f64 = 0.0, 0 to 900, "from the beam back to a second one; 0 for none", "none: the paper's machine has one";
         arm: Arm = Arm::Pendulum, 0 to 1, "a pendulum hangs across the row, a trailing arm lies along it (in a sweep 0 or 1)", "the paper: soil force times shank length is the servo's torque";
         arm_mm: f64 = 350.0, 100 to 1000, "length of the arm that swings the tool aside", "the paper's Table 1";
         tool_width_mm: f64 = 55.0, 10 to 200, "width of the tool in the row", "the paper's Table 1";
+        tool_length_mm: f64 = 0.0, 0 to 200, "length of the tool in the row along the row; X is to its middle", "none: a thin blade across the row. The paper's has 45";
         side_play_mm: f64 = 0.0, 0 to 20, "the tool strays within this across the row, by the backlash of servo and shank, evenly spread, from plant to plant", "none. Half a degree to one degree on the arm of 350 mm is 3 to 6 mm";
         sweeps_a_side: u32 = 2, 0 to 6, "sweeps between the rows, on each side of the row", "the paper's Eq. 7";
         sweep_width_mm: f64 = 80.0, 10 to 400, "width of a sweep", "the paper's Table 1";

@@ -49,7 +49,7 @@ impl ZoneSettings {
 
     /// How wide the kept ground is across the row.
     pub(super) fn kept_across_mm(&self, plant: &Canopy) -> f64 {
-        if self.stem_zone_mm == 0 { plant.across_mm } else { plant.across_mm.min(self.stem_zone_mm.into()) }
+        if self.stem_zone_mm == 0 { plant.across_mm } else { self.stem_zone_mm.into() }
     }
 
     /// The outline of a keep-out zone, from its ends on the row's line to its widest: how far the tool's edge has to be
@@ -76,12 +76,5 @@ pub(super) struct Level {
     /// From the row's line.
     pub(super) aside_mm: f64,
     /// From the zone's end, along the row.
-    inside_mm: f64,
-}
-
-impl Level {
-    /// The same in a plant's kept ground, which may be shorter than the circle.
-    pub(super) fn inside_mm(self, kept: &Range<f64>, zone_mm: u32) -> f64 {
-        self.inside_mm * ((kept.end - kept.start) / f64::from(zone_mm.max(1))).min(1.0)
-    }
+    pub(super) inside_mm: f64,
 }

@@ -54,6 +54,15 @@ impl Swing {
                 MM.value(machine.soil.depth)
             )
         });
+        let excess = match self.blade_margin_mm {
+            0 => String::new(),
+            mm => format!(", and needs {mm} mm more than the default margin"),
+        };
+        said.push(format!(
+            "Half of the blade's {:.0} mm along the row is a part of the measured margin, {:.0} mm{excess}.",
+            2.0 * self.blade_mm,
+            self.blade_mm.ceil()
+        ));
         if machine.swing.arm_trails == 0 {
             let most_kg_cm = KG_CM.value(machine.intra_row.servo_torque) / 3.0;
             let remedy = "Take a lighter arm or a stronger servo";
@@ -64,9 +73,10 @@ impl Swing {
                 if self.weight_kg_cm >= most_kg_cm { format!(": no spring can. {remedy}") } else { String::new() }
             ));
             said.push(format!(
-                "Plants of up to {:.0} mm pass beside the arm. Above that height, its shank stands inside their {} though the tool \
-                 is out.",
+                "Plants of up to {:.0} mm pass beside the arm, also where they use the whole room of {:.0} mm. Above that height, \
+                 its shank can stand inside their {} though the tool is out.",
                 self.clear_height_mm,
+                MM.value(machine.swing.room),
                 if self.stem_zone_mm > 0 { "stem's zone" } else { "canopy" }
             ));
         }

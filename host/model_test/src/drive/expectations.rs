@@ -202,7 +202,9 @@ impl Expectations {
     fn check_reason(&mut self, Place { tool, slowest, fastest }: Place, machine: &impl Machine) -> Checked {
         // The machine expects at most 2.3 times its speed, and comes in only if the row is open for twice the lead.
         let lead_s = f64::from(machine.settings().get(Setting::LeadOutMs) + 1) / 1000.0;
-        let reach = (4.6 * fastest.max(-slowest) * lead_s) as i64 + machine.ticks(Setting::MarginMm);
+        let reach = (4.6 * fastest.max(-slowest) * lead_s) as i64
+            + machine.ticks(Setting::MarginMm)
+            + self.model.widest_zone() / 2;
         let is_explained = machine.reason() != Some(Reason::Plant)
             || self.model.has_canopy_near(tool, reach)
             // The machine may guard ground that it has not reported yet, and a second beam closes more.

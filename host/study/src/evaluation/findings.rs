@@ -182,9 +182,11 @@ impl ResponseAnalysis {
         let (paper, (term, within)) = self.published.text.per_km_h.zip(self.slope())?;
         ((term.estimate - paper).abs() > within).then(|| {
             format!(
-                "{} changes by {:+.2} ± {within:.2} for each km/h, where the paper's text has {paper:+}.",
+                "{} changes by {}{} ± {} for each km/h, where the paper's text has {paper:+}.",
                 self.response.title(),
-                term.estimate
+                if term.estimate < 0.0 { '-' } else { '+' },
+                visible(term.estimate.abs(), 2),
+                visible(within, 2)
             )
         })
     }
@@ -220,7 +222,7 @@ fn effect(term: &Term, response: Response, name: &str, unit: &str) -> String {
     };
     let verb = if term.estimate < 0.0 { "falls" } else { "rises" };
     let measure = if response == Response::PerformanceIndex { "" } else { " points" };
-    format!("{verb} by {:.3}{measure} for each {unit}{significance}", term.estimate.abs())
+    format!("{verb} by {}{measure} for each {unit}{significance}", visible(term.estimate.abs(), 3))
 }
 
 /// What a plot lacks.

@@ -74,7 +74,7 @@ const MEASURES: [Measure; 6] = [
 ];
 
 fn measures(of: &Performance) -> [String; MEASURES.len()] {
-    MEASURES.map(|(_, decimals, value)| optional(value(of), |value| fixed(value, decimals)))
+    MEASURES.map(|(_, decimals, value)| optional(value(of), |value| visible(value, decimals)))
 }
 
 impl Analysis {
@@ -88,7 +88,7 @@ impl Analysis {
             let [_, mut weeding, others @ ..] = measures(&treatment.mean);
             let damage = format!("{} ({})", treatment.damaged.shown(), treatment.damaged);
             if let Some(Mean { within, of, .. }) = treatment.weeding_efficiency {
-                weeding += &within.map_or_else(String::new, |within| format!(" ± {}", fixed(within, 2)));
+                weeding += &within.map_or_else(String::new, |within| format!(" ± {}", visible(within, 2)));
                 if of < treatment.plots {
                     weeding += &format!(" ({})", counted(of, "plot"));
                 }
@@ -142,7 +142,7 @@ impl ResponseAnalysis {
     /// How well the model fits, and over which range, beside the paper's.
     pub(crate) fn fit(&self) -> Table {
         let model = self.model.as_ref().ok();
-        let range = |&(low, high): &(f64, f64)| format!("{} to {}", fixed(low, 2), fixed(high, 2));
+        let range = |&(low, high): &(f64, f64)| format!("{} to {}", visible(low, 2), visible(high, 2));
         let published: Vec<String> = self.published.ranges.iter().map(range).collect();
         let share = |value| fixed(value, 4);
         let ours = |value: fn(&LinearModel) -> f64, said: fn(f64) -> String| optional(model.map(value), said);

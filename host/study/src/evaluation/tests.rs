@@ -46,6 +46,11 @@ fn a_plot_that_cannot_be_is_named_with_its_place_and_column() {
     let nan = "plot 2: time_s is NaN: it has to be from 0.1 to 1000000000 s";
     assert_eq!(wrong(|plot| plot.time_s = Some(f64::NAN)), nan);
     assert_eq!(Analysis::of(Vec::new()).unwrap_err().to_string(), "a trial has at least one plot");
+    let blank =
+        |time_s| PlotRecord { weeds_before: None, weeds_after: None, plants: None, damaged: None, time_s, ..PLOT };
+    let error = Analysis::of(vec![blank(None)]).unwrap_err().to_string();
+    assert_eq!(error, "1 of 1 plots are not filled in: enter what was counted");
+    assert!(Analysis::of(vec![blank(Some(180.0))]).is_ok(), "a log fills in the time");
 }
 
 #[test]
@@ -87,6 +92,40 @@ fn a_small_share_of_damaged_plants_does_not_read_as_0() {
     let said =
         "1 of 25000 plants were damaged: 0.0040 %, two-sided 95 % interval 0.00010 to 0.023 %. At most 0.0040 % in";
     assert!(findings[1].starts_with(said), "{findings:?}");
+}
+
+#[test]
+fn a_small_effect_does_not_read_as_0() {
+    let plots = (0..8).map(|number| PlotRecord {
+        plot: 1 + number,
+        speed_km_h: f64::from(1 + number % 4),
+        replication: 1 + number / 4,
+        plants: Some(3_660_000),
+        damaged: Some(1 + 2 * (number % 4) + number / 6),
+        ..PLOT
+    });
+    let mut analysis = Analysis::of(plots.collect()).unwrap();
+    let finding = &analysis.findings()[2];
+    assert!(finding.starts_with("Plant damage rises by 0.000060 points for each km/h (p < 0.0001)"), "{finding}");
+    let damage = &mut analysis.responses[0];
+    assert_eq!(damage.fit().rows[4][1], "0.000027 to 0.00022");
+    let sum_of_squares = &damage.variance.as_ref().unwrap().table().rows[1][2];
+    assert!(sum_of_squares.starts_with("0.00000"), "{sum_of_squares}");
+    assert!(sum_of_squares.bytes().any(|digit| digit > b'0'), "{sum_of_squares}");
+    damage.published.text.per_km_h = Some(0.01);
+    let against = &analysis.against_the_paper()[0];
+    assert!(against.starts_with("Plant damage changes by +0.000060 ± 0.0000"), "{against}");
+    let [plots, means] = [analysis.plots(), analysis.means()].map(|table| table.to_string());
+    assert!(plots.contains(" 0.000027 ") && means.contains("0.000027"), "{plots}\n{means}");
+}
+
+#[test]
+fn the_plots_without_a_measure_are_not_said_to_have_its_speed() {
+    let fast = PlotRecord { speed_km_h: 2.0, plants: Some(0), damaged: Some(0), ..PLOT };
+    let second = PlotRecord { replication: 2, damaged: Some(3), ..PLOT };
+    let findings = Analysis::of(vec![PLOT, second, fast]).unwrap().findings();
+    let said = "Plant damage has no model: all plots with this measure have the same speed and spacing:";
+    assert!(findings.iter().any(|finding| finding.starts_with(said)), "{findings:?}");
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use super::chart::{Chart, Look, Series, key, range_of};
 use crate::evaluation::{Analysis, Response, ResponseAnalysis};
-use crate::table::{distinct, fixed, short, visible};
+use crate::table::{distinct, short, visible};
 use anyhow::Result;
 
 /// A chart with its texts.
@@ -104,7 +104,7 @@ pub fn residuals(analysis: &Analysis, of: &ResponseAnalysis) -> Result<Option<Fi
     let words = format!(
         "Residuals of the {} plots against the model's values; the largest is {} {unit}.",
         model.residuals.len(),
-        fixed(farthest, 2),
+        visible(farthest, 2),
     );
     let caption = "The residual of each plot. A curve or a funnel shows that a straight line is wrong.";
     Figure::of(["Residuals", unit, caption], words, &chart, &series).map(Some)

@@ -90,13 +90,13 @@ pub(super) fn basis(columns: &[Column]) -> Result<Basis, NoModel> {
 #[serde(rename_all = "snake_case")]
 pub enum NoModel {
     /// The response does not vary.
-    #[error("it is {} in every plot: speed and spacing explain nothing", crate::table::short(*.value))]
+    #[error("it is {} in every plot that has it: speed and spacing explain nothing", crate::table::short(*.value))]
     Constant {
         /// Its value everywhere.
         value: f64,
     },
     /// No factor varies.
-    #[error("all plots have the same speed and spacing: a model needs two levels of one of them")]
+    #[error("all plots with this measure have the same speed and spacing: a model needs two levels of one of them")]
     OneTreatment,
     /// There are too few degrees of freedom left for the scatter.
     #[error("plots: {plots}, parameters: {parameters}: this model takes at least {needed} plots")]
@@ -107,6 +107,16 @@ pub enum NoModel {
         parameters: usize,
         /// The plots that it takes.
         needed: usize,
+    },
+    /// The calculation would take minutes.
+    #[error(
+        "speeds and spacings make {treatments} treatments, and the analysis takes at most {most}: give measured speeds their nominal ones (`weeder evaluate --speeds`)"
+    )]
+    TooManyTreatments {
+        /// The treatments that there are.
+        treatments: usize,
+        /// The most that it takes.
+        most: usize,
     },
     /// Speed and spacing go together.
     #[error("speed and spacing change together, so their effects cannot be separated")]
@@ -130,10 +140,10 @@ pub enum NoModel {
 #[serde(rename_all = "snake_case")]
 pub enum Remark {
     /// Speed is no term.
-    #[error("all plots have the same speed, so that it is left out")]
+    #[error("all plots with this measure have the same speed, so that speed is left out")]
     OneSpeed,
     /// Spacing is no term.
-    #[error("all plots have the same spacing, so that it is left out")]
+    #[error("all plots with this measure have the same spacing, so that spacing is left out")]
     OneSpacing,
     /// The interaction would leave too few plots for the scatter.
     #[error("too few treatments were repeated to separate the interaction from chance: it is part of the residual")]

@@ -13,6 +13,9 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 /// Residual degrees of freedom that an analysis needs. With fewer, its p-values depend on a plot or two.
 const SPARE: usize = 3;
 
+/// The most treatments. The time grows with the cube of their number: this many take about a second.
+const MOST_TREATMENTS: usize = 200;
+
 /// One line of an analysis of variance.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Source {
@@ -67,6 +70,9 @@ impl AnalysisOfVariance {
         }
         if is_zero(scatter(values), values) {
             return Err(NoModel::Constant { value: mean(values) });
+        }
+        if treatments.len() > MOST_TREATMENTS {
+            return Err(NoModel::TooManyTreatments { treatments: treatments.len(), most: MOST_TREATMENTS });
         }
 
         let nested = |in_blocks: &[&Levels]| {
@@ -133,7 +139,9 @@ impl AnalysisOfVariance {
         let source = |pair: &[(&'static str, Fit)]| {
             let (before, (name, after)) = (pair[0].1, pair[1]);
             let degrees_of_freedom = after.parameters - before.parameters;
-            let sum_of_squares = (before.sum_of_squares - after.sum_of_squares).max(0.0);
+            // A smaller share of all is a rounding error.
+            let gained = before.sum_of_squares - after.sum_of_squares;
+            let sum_of_squares = if gained > 1e-12 * scatter(values) { gained } else { 0.0 };
             let mean_square = sum_of_squares / degrees_of_freedom as f64;
             let f = scatters.then(|| mean_square / residual_mean_square);
             let distribution = FisherSnedecor::new(degrees_of_freedom as f64, residual_freedom as f64).ok();

@@ -95,12 +95,23 @@ pub(super) fn serve(folder: &TempDir, ports: &[&Path], options: &[&str]) -> Serv
 }
 
 /// The same by a command that ends with `serve`.
-pub(super) fn serve_with(mut serve: Command, folder: &TempDir, ports: &[&Path], options: &[&str]) -> Served {
+pub(super) fn serve_with(serve: Command, folder: &TempDir, ports: &[&Path], options: &[&str]) -> Served {
+    serve_telling(Stdio::piped(), serve, folder, ports, options)
+}
+
+/// The same, with this output for the operator. One that is not piped is not read.
+pub(super) fn serve_telling(
+    operator: Stdio,
+    mut serve: Command,
+    folder: &TempDir,
+    ports: &[&Path],
+    options: &[&str],
+) -> Served {
     serve.args(["--http-port", "0", "--page"]).arg(folder.path().join("page")).args(options);
     for port in ports {
         serve.arg("--port").arg(port);
     }
-    let mut process = serve.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("cargo has built it");
+    let mut process = serve.stdout(Stdio::piped()).stderr(operator).spawn().expect("cargo has built it");
     let mut lines = BufReader::new(process.stdout.take().expect("it is piped")).lines().map_while(Result::ok);
     let mut next = || lines.next().expect("it says where the page is");
     let (here, lan) = (next(), next());
@@ -109,9 +120,9 @@ pub(super) fn serve_with(mut serve: Command, folder: &TempDir, ports: &[&Path], 
     let spelled = format!("{}-{}", &code[..4], &code[4..]);
     assert!(next().ends_with(&spelled), "{code}");
     let told = Arc::new(Mutex::new(String::new()));
-    let (heard, stderr) = (Arc::clone(&told), process.stderr.take().expect("it is piped"));
+    let (heard, stderr) = (Arc::clone(&told), process.stderr.take());
     thread::spawn(move || {
-        for line in BufReader::new(stderr).lines().map_while(Result::ok) {
+        for line in stderr.into_iter().flat_map(|stderr| BufReader::new(stderr).lines().map_while(Result::ok)) {
             heard.lock().expect("no thread has panicked").push_str(&(line + "\n"));
         }
     });
