@@ -59,7 +59,7 @@ impl Ground {
         let reaches = |leading| far - leading >= -margin;
         self.keep_out.is_closed(near, far, margin)
             // Both: a detection of the second beam lies ahead of a wide one that is open in the first.
-            || self.unclassified.known == Known::Canopy && reaches(self.unclassified.canopy.from_unclassified())
+            || self.unclassified.known == Known::Canopy && reaches(self.unclassified.canopy.begin_unclassified())
             || self.detector.open().is_some_and(|leading| reaches(self.zone_of_open(leading)))
             || self.guard.awaited(self.detector.frontier(), &self.geometry).is_some_and(reaches)
             || self.second_beam.open_alone().is_some_and(reaches)

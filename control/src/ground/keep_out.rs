@@ -60,7 +60,7 @@ impl Canopy {
     }
 
     /// Where the tool has to be out, without the margin, until the detection is classified: leaves beside the zone count.
-    pub(super) fn from_unclassified(&self) -> WrappedPosition {
+    pub(super) fn begin_unclassified(&self) -> WrappedPosition {
         self.leading + self.trim.min(Length::ZERO)
     }
 
@@ -316,7 +316,7 @@ mod tests {
             for is_single in [true, false] {
                 let plant = Canopy::of(&Detection::whole(1000, 1000 + width), Length(160), is_single);
                 assert_eq!((plant.from(), plant.to()), (at(from), at(to)), "{width}");
-                assert_eq!(plant.from_unclassified(), at(from), "{width}");
+                assert_eq!(plant.begin_unclassified(), at(from), "{width}");
             }
         }
     }

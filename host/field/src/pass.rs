@@ -342,8 +342,8 @@ mod tests {
         assert_eq!(too_fast_mm_s(&[]), 1509.0);
         // A slower sensor takes 10 ms of it.
         assert_eq!(too_fast_mm_s(&[("beam_response_ms", 11.0)]), 1404.0);
-        // Without it, the margin is kept too.
-        assert_eq!(too_fast_mm_s(&[("machine.second_beam_mm", 0.0)]), 2853.0);
+        // Without it, the margin and half of the stem zone are kept too.
+        assert_eq!(too_fast_mm_s(&[("machine.second_beam_mm", 0.0)]), 2438.0);
     }
 
     #[test]

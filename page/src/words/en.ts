@@ -247,7 +247,8 @@ export const words = {
     servoTime:
         "Time it with the tool in the soil. Without an end switch, film it: the lamp is lit while the tool is commanded out.",
     swingSix: "Swing six times",
-    swingsSix: "The tool swings in and out six times. Stop the machine where it reaches no plant, and keep clear of it.",
+    swingsSix:
+        "The tool swings in and out six times. Stop the machine where it reaches no plant, and keep clear of it.",
     timedSet: "The end switch has timed it, and both leads are set. Not saved yet.",
     timedNotSet:
         "The end switch has timed it, but these leads need the beam farther ahead, or a lower top speed: nothing is set.",

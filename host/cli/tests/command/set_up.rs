@@ -291,7 +291,7 @@ fn a_person_sets_the_virtual_uno_up_from_the_first_question_to_the_last() {
             type_to(keyboard, "");
         } else if text.contains("An end switch on D5") {
             type_to(keyboard, "on");
-        } else if text.contains("Keep clear of the tool") {
+        } else if text.contains("Keep clear of the tool [go on]") {
             timings += 1;
             type_to(keyboard, "");
             if timings == 1 {

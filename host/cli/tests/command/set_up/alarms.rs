@@ -37,7 +37,7 @@ fn an_end_switch_that_is_not_there_is_set_off_when_its_alarm_comes() {
             type_to(keyboard, "\ns\ns\ns\ns\ns\non");
         } else if text.contains("and use the end switch: on, off [on]") {
             type_to(keyboard, "off");
-        } else if text.contains("Keep clear of the tool") {
+        } else if text.contains("Keep clear of the tool [go on]") {
             questions += 1;
             // The alarm comes while the first question waits.
             if questions == 2 {
