@@ -33,9 +33,11 @@ fn the_firmware_sends_at_115200_baud() {
     uno.send(b"help\n");
     run_for_ms(&mut uno, 50);
     let cycles: Vec<u64> = uno.received_bytes().iter().map(|received| received.cycle).collect();
-    let shortest = cycles.windows(2).map(|bytes| bytes[1] - bytes[0]).min().expect("the help has many bytes") as f64;
-    let nominal = 10.0 * 16e6 / 115_200.0;
-    assert!((shortest / nominal - 1.0).abs() < 0.025, "{shortest} cycles instead of {nominal:.0}");
+    let mut apart: Vec<u64> = cycles.windows(2).map(|bytes| bytes[1] - bytes[0]).collect();
+    apart.sort_unstable();
+    // Most bytes follow the one before at once.
+    let (usual, nominal) = (apart[apart.len() / 2] as f64, 10.0 * 16e6 / 115_200.0);
+    assert!((usual / nominal - 1.0).abs() < 0.025, "{usual} cycles instead of {nominal:.0}");
 }
 
 /// Weeds with `noise` on the line every 50 ms and returns the lines that the firmware sent.
