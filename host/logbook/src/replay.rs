@@ -268,22 +268,31 @@ mod tests {
 
     #[test]
     fn work_that_begins_between_two_statuses_begins_where_the_ground_that_is_unseen_says() {
-        let happens = [
-            (1, Kind::Command, "set margin_mm 22"),
-            (1, Kind::Answer, "ok"),
-            (5, Kind::Event, "state is=work"),
-            (14, Kind::Event, "swing tool=in pos=1300"),
-        ];
-        let mut log = log(&happens);
-        // It began 30 mm behind the fifth status: X and the margin ahead are unseen there.
-        let statuses = log.iter_mut().filter(|entry| entry.kind == Kind::Status).enumerate().skip(6);
-        for (number, entry) in statuses {
-            let (before, _) = entry.text.split_once("unseen_mm").unwrap();
-            entry.text = format!("{before}unseen_mm={}", (422 + 30 + 250_usize).saturating_sub(50 * number));
+        // Half of a stem zone is unseen too.
+        for (zone, half_mm, swing) in [("set stem_zone_mm 0", 0, 1300), ("set stem_zone_mm 110", 55, 1405)] {
+            let swing = format!("swing tool=in pos={swing}");
+            let happens = [
+                (1, Kind::Command, "set margin_mm 22"),
+                (1, Kind::Answer, "ok"),
+                (1, Kind::Command, "set top_speed_mm_s 1000"),
+                (1, Kind::Answer, "ok"),
+                (1, Kind::Command, zone),
+                (1, Kind::Answer, "ok"),
+                (5, Kind::Event, "state is=work"),
+                (if half_mm == 0 { 14 } else { 15 }, Kind::Event, &swing),
+            ];
+            let mut log = log(&happens);
+            // It began 30 mm behind the fifth status: X and the margin ahead are unseen there.
+            let statuses = log.iter_mut().filter(|entry| entry.kind == Kind::Status).enumerate().skip(6);
+            for (number, entry) in statuses {
+                let (before, _) = entry.text.split_once("unseen_mm").unwrap();
+                let unseen_mm = (422 + half_mm + 30 + 250_usize).saturating_sub(50 * number);
+                entry.text = format!("{before}unseen_mm={unseen_mm}");
+            }
+            let replayed = replay(&log).unwrap();
+            assert_eq!((replayed.difference, replayed.swings), (None, 1), "{zone}");
+            assert!(replayed.farthest_swing <= 4, "{} ticks", replayed.farthest_swing);
         }
-        let replayed = replay(&log).unwrap();
-        assert_eq!((replayed.difference, replayed.swings), (None, 1));
-        assert!(replayed.farthest_swing <= 4, "{} ticks", replayed.farthest_swing);
     }
 
     /// The log of a machine that is at work from before the first status on.

@@ -102,8 +102,8 @@ impl<'a> Stretch<'a> {
     /// detection in the log that the machine had reached by then, and the gap that the firmware wants to see ahead of it.
     pub(super) fn began(&self) -> i32 {
         let first = self.first.position;
-        // There the tool had all of this to go: the distance from the beam, and the margin ahead of unseen ground.
-        let all_mm = self.settings.get(Setting::BeamToToolMm) + self.settings.get(Setting::MarginMm);
+        // There the tool had all of this to go.
+        let all_mm = unseen_at_begin_mm(&self.settings);
         let rolled = if self.first.unseen_mm > 0 {
             let unseen_mm = self.first.unseen_mm.min(all_mm.into()) as u16;
             if unseen_mm == all_mm {
@@ -141,8 +141,8 @@ impl<'a> Stretch<'a> {
         let first = self.first.position;
         let reached = self.reached_at_first().map_or(0, |(_, end)| end.wrapping_sub(first).max(0));
         // The zone of the last canopy before.
-        let zone = [Setting::BeamToToolMm, Setting::MarginMm].map(|setting| self.settings.ticks(setting).0);
-        let from = zone.into_iter().fold(first.saturating_add(reached), i32::saturating_add);
+        let zone = self.settings.wheel().ticks(unseen_at_begin_mm(&self.settings)).0;
+        let from = first.saturating_add(reached).saturating_add(zone);
         if self.settings.get(Setting::GuardSpacingMm) == 0 {
             return from;
         }
@@ -198,17 +198,14 @@ impl<'a> Stretch<'a> {
         }
     }
 
-    /// Where work began after a position. It begins on unseen ground, from the tool to the beam and a margin ahead, and the next
-    /// status says how much of that is left. `None` if the log does not tell.
+    /// Where work began after a position. It begins on unseen ground, and the next status says how much of that is left. `None` if the log does not tell.
     fn begin_of_work(&self, place: usize, before: Option<i32>, settings: &Settings) -> Option<i32> {
         let ends = |happened: &Happened| {
             matches!(happened, Happened::Event(EventLine::Alarm { .. } | EventLine::State { mode: Mode::Work }))
         };
         let mut until_next = self.happened[place + 1..].iter().take_while(|(_, happened)| !ends(happened));
         let next = until_next.find_map(status).filter(|next| next.unseen_mm > 0)?;
-        let [to_beam_mm, margin_mm] =
-            [Setting::BeamToToolMm, Setting::MarginMm].map(|setting| i32::from(settings.get(setting)));
-        let left_mm = u16::try_from(to_beam_mm + margin_mm - next.unseen_mm).unwrap_or(0);
+        let left_mm = u16::try_from(i32::from(unseen_at_begin_mm(settings)) - next.unseen_mm).unwrap_or(0);
         let most = next.position.wrapping_sub(before?).max(0);
         Some(next.position.wrapping_sub(settings.wheel().ticks(left_mm).0.min(most)))
     }
@@ -276,6 +273,14 @@ impl<'a> Stretch<'a> {
     pub(super) fn next_status(&self, place: usize) -> Option<&Status> {
         self.happened[place..].iter().find_map(status)
     }
+}
+
+/// Ground that is unseen where work begins, mm: from the tool to the beam, and ahead of it the margin and half of a stem
+/// zone.
+fn unseen_at_begin_mm(settings: &Settings) -> u16 {
+    let [to_beam_mm, margin_mm, zone_mm] =
+        [Setting::BeamToToolMm, Setting::MarginMm, Setting::StemZoneMm].map(|setting| settings.get(setting));
+    to_beam_mm + margin_mm + zone_mm / 2
 }
 
 /// Whether it is a change of state.
