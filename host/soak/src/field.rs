@@ -423,7 +423,8 @@ mod tests {
         while field.tally.violations.is_empty() && field.tally.rows < 20 {
             let (machine, stem_zone_mm) = field.draw_machine();
             // The beam is there, but its wire is not.
-            field.typed[1].1 = 0;
+            field.typed.retain(|(setting, _)| *setting != Setting::SecondBeamMm);
+            field.typed.push((Setting::SecondBeamMm, 0));
             let row = PLANTING.grow(field.rng.random()).expect("rows grow");
             field.work(&row, &machine, stem_zone_mm, f64::INFINITY);
         }
