@@ -1,8 +1,9 @@
 //! Closed ground: where the tool must be out.
 //!
 //! Ground is closed if no beam has seen it, or within the margin of a canopy. A detection without an end or a class and an
-//! expected plant count as canopies. One without an end has the stem zone that it would have if it ended here. The tool must be out while closed ground lies within the leads. It must also be out while the
-//! machine is so fast that a plant just behind the beam would reach it first.
+//! expected plant count as canopies. A detection without an end has the stem zone that it would have if it ended here. The tool must
+//! be out while closed ground lies within the leads. It must also be out while the machine is so fast that a plant just behind the
+//! beam would reach it first.
 
 use super::{Ground, unclassified::Known};
 use crate::units::{Length, Position, WrappedPosition};

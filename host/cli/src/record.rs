@@ -176,7 +176,7 @@ impl Logs {
     }
 
     /// Reports a log that could not be written. The other rows' logs continue. Fails if no log is left.
-    pub fn go_on_after(&self, written: Result<(), LogError>, row: usize, chosen: &Chosen) -> Result<()> {
+    fn go_on_after(&self, written: Result<(), LogError>, row: usize, chosen: &Chosen) -> Result<()> {
         if let Err(error) = written {
             tell!("error: {}", chosen.under_name(row, &format!("{:#}", anyhow::Error::from(error))));
             ensure!(self.0.iter().any(|log| log.is_written), "no log can be written any more");

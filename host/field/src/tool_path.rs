@@ -1,12 +1,13 @@
 //! Damage and weeding as geometry: the ground that the tools pass through, seen from above.
 //!
-//! The arm swings sideways, so the tool's middle is `arm * sin(angle)` to the left of the row's line. An arm that trails
-//! behind its pivot also carries the tool forward. The tool is a rectangle: `tool_width` across the row and `tool_length`
-//! along it, half ahead of its middle and half behind. With a length of 0 it is a line. A plant is *damaged* if the tool passes through the protected zone round its stem. A weed is *removed* if the tool or a sweep passes it. The
-//! sweeps run between the rows, do not swing, and stay clear of the zones while the machine keeps its line. If the
-//! machine strays, they cut plants of this row or of the next rows. So does a tool that swings as far as the next row.
-//! Each kind of damage is counted by itself. A strip that no tool weeds may remain between the tool in the row and the
-//! nearest sweep ([`unweeded_strip_mm`]).
+//! The arm swings sideways, so the tool's middle is `arm * sin(angle)` to the left of the row's line. An arm that
+//! trails behind its pivot also carries the tool forward. The tool is a rectangle: `tool_width` across the row and
+//! `tool_length` along it, half ahead of its middle and half behind. With a length of 0 it is a line. A plant is
+//! *damaged* if the tool passes through the protected zone round its stem. A weed is *removed* if the tool or a sweep
+//! passes it. The sweeps run between the rows, do not swing, and stay clear of the zones while the machine keeps its
+//! line. If the machine strays, they cut plants of this row or of the next rows. So does a tool that swings as far as
+//! the next row. Each kind of damage is counted by itself. A strip that no tool weeds may remain between the tool in
+//! the row and the nearest sweep ([`unweeded_strip_mm`]).
 //!
 //! Weeding efficiency is counted twice (Eq. 22). *In the row* are the weeds between the sweeps on either side: they
 //! depend on the controller. *In the whole plot* are all weeds between the middles of two gaps between rows, as in the

@@ -10,8 +10,8 @@ use control::settings::{Setting, Settings};
 const SCATTER_OUT_MS: f64 = 20.0;
 const SCATTER_IN_MS: f64 = 9.0;
 
-/// The most by which the lead out is shortened. With an end switch, the firmware raises an alarm if the tool is not out 100 ms
-/// after its lead. The other 40 ms are for the switch and for a servo that has become slower.
+/// The lead out is shortened by this at most. An end switch has to close within 100 ms of that lead: else the firmware raises
+/// alarm 4-1. The other 40 ms are for the switch, and for a servo that has become slower.
 const MOST_SAVED_OUT_MS: f64 = 60.0;
 
 /// What the two measured leads differ by beside the stroke: the longest wait of a command, and the scatter of a hobby

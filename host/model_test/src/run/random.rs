@@ -125,6 +125,8 @@ fn steps() -> BoxedStrategy<Vec<Step>> {
         1 => (1_u32..100).prop_map(|times| Tremble { times }),
         5 => line().prop_map(Type),
         4 => setting().prop_map(Type),
+        // With the factory's lead and speed, a zone needs a beam farther ahead.
+        2 => (30_u32..200).prop_map(|mm| Type(format!("hold\nset top_speed_mm_s 700\nset margin_mm 20\nset stem_zone_mm {mm}\nstart"))),
         2 => any::<bool>().prop_map(|on| Switch { on }),
         3 => fault(),
         1 => cause.prop_map(Reset),
