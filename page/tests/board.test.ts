@@ -13,18 +13,28 @@ interface Line {
     readonly verdict: "pass" | "differs" | "fail";
 }
 
-test("the board check passes the firmware on avr8js too", () => {
+/** A check of the firmware on avr8js. */
+function check(): { wires: string[]; lines: Line[] } {
     const words = ["check-board", "--simulated", "--brief", "--second-simulator", "build/lockstep.mjs", "--json"];
     const { status, stdout, stderr } = spawnSync(WEEDER, words, { encoding: "utf8" });
     assert(status === 0 || status === 1, `${stdout}${stderr}`);
-    const { wires, lines }: { wires: string[]; lines: Line[] } = JSON.parse(stdout);
-    for (const { id, measured, simulated } of lines.filter(({ verdict }) => verdict === "differs"))
+    return JSON.parse(stdout);
+}
+
+/** What fails in it. The time of a typed `hold` includes the computer, which may be busy. */
+function failed({ lines }: { lines: Line[] }): Line[] {
+    return lines.filter(({ id, verdict }) => verdict === "fail" && id !== "hold_out");
+}
+
+test("the board check passes the firmware on avr8js too", () => {
+    let report = check();
+    // A busy computer may open the port too late for the reset's window. A fault of the firmware fails again.
+    if (failed(report).length > 0) report = check();
+    for (const { id, measured, simulated } of report.lines.filter(({ verdict }) => verdict === "differs"))
         console.log(`${id} is ${measured} on avr8js, and ${simulated} on simavr`);
-    // The time of a typed `hold` includes the computer, which may be busy.
-    const failed = lines.filter(({ id, verdict }) => verdict === "fail" && id !== "hold_out");
-    assert.deepEqual([wires, failed], [[], []]);
+    assert.deepEqual([report.wires, failed(report)], [[], []]);
     // The limits of each of these exclude a simulator without any output.
-    const ids = lines.map(({ id }) => id);
+    const ids = report.lines.map(({ id }) => id);
     for (const id of ["pulse_out_us", "highest_forward_busy", "beam_flickers_code", "row_2.5_reached"])
         assert(ids.includes(id), `${id} is not in the report`);
 });
