@@ -376,8 +376,15 @@ impl Machine for Board {
         while self.uno.bytes_pending() > 0 {
             self.uno.run_for_ms(1)?;
         }
+        let mut cause = cause;
         match cause {
-            Cause::LoopStalled => self.uno.stall()?,
+            Cause::LoopStalled => {
+                self.uno.stall()?;
+                // In a critical section the heartbeat's interrupt is not served, and leaves no mark.
+                if !self.uno.interrupts_are_enabled() {
+                    cause = Cause::Watchdog;
+                }
+            }
             Cause::BrownOut => self.uno.brown_out(),
             Cause::ResetPin => self.uno.reset(),
             _ => match torn {

@@ -255,6 +255,11 @@ impl Uno {
         self.step(self.cycle() + 1)
     }
 
+    /// Whether interrupts are served: false in a handler and in a critical section.
+    pub fn interrupts_are_enabled(&self) -> bool {
+        self.core.interrupts_are_enabled()
+    }
+
     /// Where the program stands.
     pub fn place(&self) -> Place {
         self.core.place()

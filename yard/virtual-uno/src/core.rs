@@ -201,6 +201,12 @@ impl Core {
         unsafe { (*self.chip.avr()).interrupts.running_ptr > 0 }
     }
 
+    /// Whether interrupts are served: the I bit of the status register.
+    pub(super) fn interrupts_are_enabled(&self) -> bool {
+        // SAFETY: as in `program_counter`.
+        unsafe { (*self.chip.avr()).sreg[simavr::S_I as usize] != 0 }
+    }
+
     pub(super) fn place(&self) -> Place {
         match self.next_instruction() {
             _ if self.is_in_handler() => Place::InHandler,
@@ -253,7 +259,7 @@ impl Core {
             let until_next_timer = simavr::avr_cycle_timer_process(avr);
             match (*avr).state as u32 {
                 simavr::cpu_Running => self.add_wake_up(),
-                simavr::cpu_Sleeping if (*avr).sreg[simavr::S_I as usize] == 0 && !self.watchdog_resets() => {
+                simavr::cpu_Sleeping if !self.interrupts_are_enabled() && !self.watchdog_resets() => {
                     return Err(UnoError::Halted { cycle: (*avr).cycle, program_counter: (*avr).pc });
                 }
                 simavr::cpu_Sleeping => {
@@ -268,9 +274,7 @@ impl Core {
         }
         self.finish_reset(ResetCause::Watchdog);
         if measuring {
-            let cycle = self.cycle();
-            // SAFETY: as in `program_counter`.
-            let enabled = unsafe { (*avr).sreg[simavr::S_I as usize] != 0 };
+            let (cycle, enabled) = (self.cycle(), self.interrupts_are_enabled());
             self.recorder_mut().log.interrupts.interrupts_enabled(enabled, cycle);
         }
         Ok(())
