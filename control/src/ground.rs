@@ -94,17 +94,20 @@ impl Ground {
     }
 
     /// Recalculates the distances after a change of settings. [`catch_up`](Self::catch_up) then recalculates the leads. A new scale
-    /// makes all positions invalid, so the ground is then forgotten.
+    /// makes all positions invalid, and a new stem zone all canopies, which are known with the old one. So the ground is then
+    /// forgotten.
     pub fn follow(&mut self, settings: &Settings, position: Position) {
-        let scale = self.geometry.scale;
+        let (scale, stem_zone) = (self.geometry.scale, self.geometry.stem_zone());
         let guard_spacing = self.geometry.guard_spacing();
+        let is_doubtful = self.zones() > 0 || self.has_rolled_back();
         self.correct(settings);
         if self.geometry.guard_spacing() != guard_spacing {
             self.guard = Guard::NONE;
         }
-        if self.geometry.scale != scale {
+        if self.geometry.scale != scale || self.geometry.stem_zone() != stem_zone {
             self.beam = self.geometry.scale.wrap(position);
             self.begin_here(self.detector.is_broken());
+            self.keep_out.mark_dropped(is_doubtful);
         }
         self.outdate_leads();
     }
@@ -181,6 +184,12 @@ impl Ground {
         let has_left = self.has_left();
         self.keep_out.invalidate(self.detector.frontier() + self.geometry.beyond_canopy());
         self.keep_out.mark_dropped(has_left);
+    }
+
+    /// As [`forget`](Self::forget), without an alarm that tells. The operator does not know, so nobody can vouch for that ground.
+    pub fn doubt(&mut self) {
+        self.forget();
+        self.keep_out.mark_dropped(true);
     }
 
     /// Edges of the beams were lost, so this ground is unknown. The beams' levels are now `broken` and `second_broken`.
@@ -392,7 +401,37 @@ mod tests {
     }
 
     #[test]
-    fn a_plant_stays_expected_after_every_setting_except_another_spacing() {
+    fn plants_that_were_forgotten_without_an_alarm_are_no_bare_ground() {
+        let scale = (Setting::TicksPerM, 2402);
+        for change in [None, Some(scale), Some((Setting::StemZoneMm, 100))] {
+            for is_known in [true, false] {
+                let (mut ground, mut settings) = ground();
+                settings.set(Setting::TicksPerM, 2399).expect("within its range");
+                ground.follow(&settings, Position::new(1400));
+                ground.begin(Position::new(1400), false);
+                if is_known {
+                    let canopy = pass(&mut ground, 2000, 2300);
+                    keep(&mut ground, canopy);
+                }
+                ground.roll_to(Position::new(2500));
+                match change {
+                    None => ground.doubt(),
+                    Some((setting, value)) => {
+                        settings.set(setting, value).expect("within its range");
+                        ground.follow(&settings, Position::new(2500));
+                    }
+                }
+                assert_eq!(ground.zones(), 0, "{change:?}");
+                assert_eq!(ground.has_rolled_back(), is_known || change.is_none(), "{change:?}");
+                // The tool has passed that ground.
+                ground.roll_to(Position::new(4000));
+                assert!(!ground.has_rolled_back(), "{change:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_plant_stays_expected_after_another_margin_and_not_after_another_spacing() {
         for (setting, value, is_due) in [(Setting::MarginMm, 60, true), (Setting::GuardSpacingMm, 510, false)] {
             let (mut ground, mut settings) = ground();
             settings.set(Setting::GuardSpacingMm, 500).expect("within its range");

@@ -105,6 +105,21 @@ fn a_detection_unknown_to_the_built_in_examples_is_taught_without_force() {
 }
 
 #[test]
+fn a_detection_whose_start_was_not_seen_takes_no_label() {
+    let mut rolling = Rolling::new();
+    rolling.machine.see(Beams::one(true));
+    rolling.ask("start");
+    rolling.ask("hold");
+    assert_eq!(rolling.past(0, 150), Class::Unknown);
+    for line in ["label plant", "label weed force"] {
+        assert_eq!(rolling.ask(line), "error: there is no detection without a label, let the beam see one first");
+    }
+    assert_eq!(rolling.label(), None);
+    rolling.past(500, 150);
+    assert_eq!(rolling.ask("label plant"), "ok");
+}
+
+#[test]
 fn a_wrong_example_is_forgotten_by_its_number_or_with_all_others() {
     for command in ["forget 0", "forget all"] {
         let mut rolling = Rolling::new();

@@ -12,7 +12,7 @@ use uno::elf::{Image, Size};
 use uno_run::firmware::workspace_root;
 
 /// The budgets, as in .ci/run.
-const FLASH_BYTES: u64 = 29_950;
+const FLASH_BYTES: u64 = 30_030;
 const SRAM_BYTES: u64 = 1120;
 
 /// The stack's room at link time, by memory.x.

@@ -1,6 +1,6 @@
 //! Unsteady motions: the tool's position follows from the machine's position and speed, so plants are equally safe.
 
-use crate::common::{Run, number, pass};
+use crate::common::{Run, ask, number, pass, status};
 use field::machine::cycle_at;
 use field::motion::{Motion, mm_s};
 use field::pass::{Pass, Start};
@@ -153,5 +153,31 @@ fn after_a_turn_with_reversing_a_plant_of_the_next_row_is_kept() {
         let start = cycle_at(run.cycles().start, start_s);
         let commands = run.commands();
         assert!(commands.iter().any(|command| command.rise_cycle > start && !command.is_out), "it weeds the next row");
+    }
+}
+
+#[test]
+fn after_a_stop_so_hard_that_the_encoder_seems_silent_start_now_takes_no_plant_for_bare_ground() {
+    // The second plant stands between beam and tool.
+    let motion = Motion::starting_at(0.0)
+        .change_speed(mm_s(2.5), 1000.0)
+        .stop_at(1800.0, 10_000.0)
+        .go_on_for(1.0)
+        .change_speed(mm_s(0.3), 500.0)
+        .stop_at(1830.0, 500.0)
+        .go_on_for(2.0)
+        .change_speed(mm_s(2.5), 1000.0)
+        .roll_to(2900.0);
+    let row = Row::new(PLACES_MM.map(|place_mm| Canopy::plant(place_mm, 150.0)).to_vec()).expect("they stand apart");
+    let stopped_s = motion.passings(1829.0).next().expect("the machine comes there").time_s + 1.0;
+    let mut run = Run::begin(pass(row, motion), &[]);
+    run.uno.run_until(cycle_at(run.cycles().start, stopped_s)).expect("the firmware runs");
+    ask(&mut run.uno, "hold");
+    let said = status(&mut run.uno);
+    assert!(number(&said, "unseen_mm") > 300, "the plants are forgotten: {said}");
+    ask(&mut run.uno, "start now");
+    run.roll_to_the_end();
+    for plant in &run.judgement().plants {
+        assert_ne!(plant.verdict, Verdict::Damaged, "{plant:?}");
     }
 }

@@ -99,7 +99,7 @@ impl Ground {
         self.keep_out.open_from(self.geometry.margin()) - (self.tool() + distance)
     }
 
-    /// Whether the beam has rolled back by more than the margin, so that it sees no edge up to the frontier; or the tool to dropped
+    /// Whether the beam has rolled back by more than the margin, so that it sees no edge up to the frontier; or the tool is on dropped
     /// ground.
     pub fn has_rolled_back(&self) -> bool {
         self.detector.frontier() - self.beam > self.geometry.margin() || self.has_left()

@@ -105,7 +105,7 @@ pub struct KeepOut {
     canopies: Vec<Canopy, CAPACITY, u8>,
     /// All ground behind this position is unknown.
     known_from: WrappedPosition,
-    /// Whether the beam saw that ground, and it was dropped for distance or lack of room.
+    /// Whether the beam saw that ground, and it was dropped: for distance, for lack of room, or in doubt.
     has_dropped: bool,
 }
 

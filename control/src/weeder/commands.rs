@@ -13,7 +13,7 @@ use knn::Example;
 impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Goes to work, on ground that the beam has yet to see. With `now`, the tool may enter at once: ground seen before stays known,
     /// and other ground counts as bare. Not after the machine has rolled back: there the beam would miss plants of another row, and the
-    /// machine may have dropped plants of this one.
+    /// machine may have dropped plants of this one. Nor on ground that was forgotten without an alarm.
     ///
     /// # Errors
     /// [`CommandError::AlarmLatched`], and a [`Contradiction`](crate::settings::Contradiction) between settings.
@@ -111,7 +111,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         let detection = self
             .detections
             .newest()
-            .filter(|detection| detection.label.is_none() && self.ground.unclassified().is_none())
+            .filter(|detection| {
+                // Without a vote, its beginning was not seen, and its width is not that of the plant.
+                detection.label.is_none() && detection.vote.votes > 0 && self.ground.unclassified().is_none()
+            })
             .ok_or(CommandError::NothingToLabel)?;
         let features = detection.features();
         // A wrong label would change the class of later detections, without any sign of the cause.

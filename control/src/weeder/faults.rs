@@ -38,7 +38,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         }
         if self.sensors.encoder.is_silent() {
             // The distance since then is unknown.
-            self.ground.forget();
+            self.ground.doubt();
         }
         match fault {
             // A machine at rest may tremble.

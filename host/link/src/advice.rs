@@ -27,7 +27,7 @@ pub fn alarm(alarm: Alarm) -> &'static str {
         Alarm::TooFast => "drive slower, or beam farther ahead and raise the limit",
         Alarm::RolledBackTooFar => "roll forward to where you stopped, then `clear`",
         Alarm::ScheduleFull => "clean the beam, set it nearer, raise `merge_gap_mm`",
-        Alarm::CropUnknown => "crop? `label plant`; weeds? `misfit_after`; else as 1-2",
+        Alarm::CropUnknown => "crop? teach it; weeds? `misfit_after`; else as 1-2",
         Alarm::ToolStuck => "stop; look for a stone, a dead servo, a loose switch",
         Alarm::SettingsLost => "check `get`, set what differs, `save`, `clear`",
         Alarm::SettingsContradict => "`clear`; `start` says which; change one, `save`",
