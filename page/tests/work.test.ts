@@ -3,14 +3,13 @@
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
-import { resolve } from "node:path";
 import test, { after, before, type TestContext } from "node:test";
 import type { Browser, Page } from "playwright-core";
-import { close, DESK, inspect, launch, moving, type Opened, open, PHONE } from "./browser.ts";
+import { close, DESK, inspect, launch, moving, PHONE } from "./browser.ts";
+import * as panel from "./panel.ts";
+import { FIRMWARE, part, type } from "./panel.ts";
 import { type Device, Foreign, VirtualUno } from "./ports.ts";
 import { WEEDER } from "./weeder.ts";
-
-const FIRMWARE = resolve("../target/avr-none/firmware/weeder-firmware.elf");
 
 let browser: Browser;
 
@@ -21,44 +20,11 @@ before(async () => {
 
 after(() => browser?.close());
 
-const part = (page: Page, name: string) => page.locator(`#work-panel [data-part="${name}"]`);
-
 /** Opens the panel and connects it to a device. */
-async function connect(device: Device, viewport = DESK): Promise<Opened> {
-    const opened = await open(browser, "work", viewport, [device]);
-    await opened.page.getByRole("button", { name: "Connect an Uno" }).click();
-    return opened;
-}
+const connect = (device: Device, viewport = DESK) => panel.connect(browser, device, viewport);
 
 /** The panel of a virtual Uno with saved settings, whose machine rolls. */
-async function atHold(test: TestContext, viewport = DESK, ...row: string[]): Promise<Opened & { uno: VirtualUno }> {
-    const uno = await VirtualUno.start(test, "--elf", FIRMWARE, ...row);
-    const opened = await connect(uno, viewport);
-    await type(opened.page, "save");
-    await part(opened.page, "clear").click();
-    await part(opened.page, "state").filter({ hasText: "hold" }).waitFor();
-    return { ...opened, uno };
-}
-
-/** Types a command, and waits for its `ok`. */
-async function type(page: Page, command: string): Promise<void> {
-    const said = part(page, "said");
-    await page.getByRole("tab", { name: "Console" }).click();
-    const before = await said.locator("div", { hasText: /^ok$/ }).count();
-    await part(page, "typed").fill(command);
-    try {
-        await page.locator("#work-panel").getByRole("button", { name: "Send" }).click();
-    } catch (error) {
-        const told = await said.locator("div").allTextContents();
-        throw new Error(
-            `the console takes no ${command}: ${await part(page, "why").textContent()} ${told.join(" / ")}`,
-            {
-                cause: error,
-            },
-        );
-    }
-    await said.locator("div", { hasText: /^ok$/ }).nth(before).waitFor();
-}
+const atHold = (test: TestContext, viewport = DESK, ...row: string[]) => panel.atHold(browser, test, viewport, ...row);
 
 test("a new board shows its alarm with what to do, works, and holds, and all of that is on a phone's screen", async (test) => {
     const uno = await VirtualUno.start(test, "--elf", FIRMWARE);
@@ -454,46 +420,5 @@ test("the console follows again after another tab, unless it was scrolled back",
     await said.evaluate((it) => it.scrollTo(0, 0));
     await type(page, "get k");
     assert.equal(await said.evaluate((it) => it.scrollTop), 0);
-    await close({ page, errors });
-});
-
-test("the steps of the set-up take a value each, set and save it, and keep what is being typed", async (test) => {
-    const { page, errors } = await atHold(test, PHONE, "--stand");
-    await page.getByRole("tab", { name: "Calibrate" }).click();
-    const steps = part(page, "set-up-steps");
-    const beam = steps.locator("[data-step=beam_to_tool_mm]");
-    assert.equal(await beam.inputValue(), "400");
-    assert.equal(await steps.getByLabel("ticks_per_rev", { exact: true }).inputValue(), "2400");
-    const step = steps.locator("li").filter({ has: page.locator("[data-step=beam_to_tool_mm]") });
-    await beam.fill("4000");
-    await step.getByRole("button", { name: "Set and save" }).click();
-    await step.getByText("beam_to_tool_mm takes a whole number from").waitFor();
-    assert.equal(await beam.inputValue(), "4000");
-    await beam.fill("430");
-    await step.getByRole("button", { name: "Set and save" }).click();
-    await step.getByText("Saved.").waitFor();
-    // What the machine shows is marked, and the operator marks the other steps.
-    await steps.getByText("Open: second_beam_mm is 0").waitFor();
-    await part(page, "set-up-done").filter({ hasText: "0 of 8 steps are done." }).waitFor();
-    await step.getByRole("checkbox", { name: "I have done it" }).check();
-    await steps.locator("[data-step=stem_zone_mm]").fill("110");
-    const stem = steps.locator("li").filter({ has: page.locator("[data-step=stem_zone_mm]") });
-    // The factory's is too long for a zone.
-    await stem.locator("[data-step=lead_out_ms]").fill("156");
-    await stem.getByRole("button", { name: "Set and save" }).click();
-    await stem.getByText("✓ Done").waitFor();
-    await part(page, "set-up-done").filter({ hasText: "2 of 8 steps are done." }).waitFor();
-    await inspect(page, "phone-set-up");
-    await type(page, "revert");
-    await type(page, "get beam_to_tool_mm");
-    await part(page, "said")
-        .getByText(/^beam_to_tool_mm=430/)
-        .first()
-        .waitFor();
-    await page.getByRole("tab", { name: "Calibrate" }).click();
-    await steps.getByRole("button", { name: "Swing six times" }).click();
-    await steps.getByText("The tool swings in and out six times.").waitFor();
-    await page.locator("#language").selectOption("fr");
-    assert.equal(await beam.inputValue(), "430");
     await close({ page, errors });
 });

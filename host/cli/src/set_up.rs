@@ -4,10 +4,12 @@
 //! a set-up can be continued. The steps come from the manual's page, and the margin from [`set_up`], as in the
 //! monitor and on the page.
 
+mod machine;
 mod measuring;
 mod simulated;
 mod state;
 
+use self::machine::{asked, take_arm};
 use self::state::State;
 use crate::input::{self, Line};
 use crate::ports::Port;
@@ -17,18 +19,15 @@ use control::alarm::Alarm;
 use files::{bounded_file, whole_file};
 use frame::{say, source, tell};
 use link::row_names::Board;
-use link::settings::{self, Setting, SettingsError, name, range, unit};
+use link::settings::{self, Setting, SettingsError, allowed_top_speed, name, range, unit};
 use link::{ConsoleLine, EventLine, Link, LinkError, Mode, Status, advice};
-use mechanics::design::Design;
-use mechanics::machine::{Input, Machine};
-use mechanics::swing::Swing;
-use mechanics::unit::{MM, SECOND};
-use set_up::circle::Arm;
-use set_up::{ManualStep, SetUp, Task, steps};
-use std::collections::BTreeMap;
+use mechanics::machine::Machine;
+use set_up::{ManualStep, Task, steps};
 use std::fmt;
 use std::io::{self, IsTerminal, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, TryRecvError};
 
 #[derive(Args)]
@@ -58,23 +57,6 @@ pub struct Arguments {
     simulated: bool,
 }
 
-/// The measures from which `weeder design` calculates the stroke: the key in a machine file, and the question.
-const TOOL_WIDTH: &str = "intra_row.width";
-const ASKED: [(&str, &str); 12] = [
-    (TOOL_WIDTH, "The tool's width"),
-    ("intra_row.shank_length", "The arm's length, from the servo's axis to the blade's tip"),
-    ("intra_row.shank_diameter", "The arm's diameter, as that of a steel rod of its weight"),
-    ("intra_row.blade_base", "The blade's length along the row"),
-    ("intra_row.blade_height", "The blade's height"),
-    ("intra_row.blade_mass", "The blade's mass, with its clamp"),
-    ("intra_row.servo_torque", "The servo's greatest torque"),
-    ("swing.servo_time_60", "The servo's time for 60 degrees without load"),
-    ("swing.pulse_for_90", "The pulse's change in us for 90 degrees: 1000 for most, 667 for servos of 270 degrees"),
-    ("swing.protected", "The width round a stem that no tool may enter"),
-    ("swing.stem_off", "How far a stem may stand off the middle of its canopy"),
-    ("swing.room", "Room beside the stem zone: plants off the line, a machine that strays, play at the tip"),
-];
-
 /// Leads through the steps.
 pub fn run(arguments: &Arguments) -> Result<()> {
     if arguments.simulated {
@@ -90,12 +72,16 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let mut state = if arguments.again { State::default() } else { kept_state };
     whole_file::check(path).with_context(|| format!("{} cannot be written", path.display()))?;
     let machine = arguments.machine.as_deref().map(mechanics::file::read).transpose()?;
+    if let Some(machine) = &machine {
+        state.take_machine(machine);
+    }
     let known = machine.map_or_else(|| asked(&state), Ok)?;
     take_arm(&mut state.measured, &known);
     let board = Board::at(&arguments.port.board()?.port()?)?;
     state.take_board(&board, path)?;
     let link = board.open()?;
-    match (Guide { link, state, machine, typed: input::typed(), path: path.clone(), watches: false }).lead() {
+    let stop = crate::ctrl_c()?;
+    match (Guide { link, state, machine, typed: input::typed(), path: path.clone(), watches: false, stop }).lead() {
         Err(error) if error.is::<End>() => say!("Stopped. The same command continues here."),
         ended => ended,
     }
@@ -114,6 +100,14 @@ impl fmt::Display for End {
     }
 }
 
+fn yes_or_no(typed: &str) -> Result<bool, String> {
+    match typed.to_lowercase().as_str() {
+        "yes" | "y" => Ok(true),
+        "no" | "n" => Ok(false),
+        _ => Err("type yes or no, s or q".to_owned()),
+    }
+}
+
 struct Guide {
     link: Link,
     state: State,
@@ -122,6 +116,8 @@ struct Guide {
     path: PathBuf,
     /// Whether detections are printed while a question waits.
     watches: bool,
+    /// Whether the user has typed Ctrl-C.
+    stop: Arc<AtomicBool>,
 }
 
 impl Guide {
@@ -159,8 +155,18 @@ impl Guide {
         self.summary(&steps)
     }
 
+    /// Stops if the user has typed Ctrl-C: the tool may be in the row, or swing.
+    fn obey_ctrl_c(&mut self) -> Result<()> {
+        if self.stop.load(Ordering::Relaxed) {
+            self.link.ask("hold")?;
+            return Err(Error::msg(End::Stop));
+        }
+        Ok(())
+    }
+
     /// The next event of the machine, with its line. An alarm is shown and cleared first.
     fn hear(&mut self) -> Result<Option<(EventLine, String)>> {
+        self.obey_ctrl_c()?;
         let Some(line) = self.link.next_line()? else { return Ok(None) };
         let ConsoleLine::Event(event) = ConsoleLine::parse(&line) else { return Ok(None) };
         if matches!(event, EventLine::Alarm { .. } | EventLine::Newer { is_alarm: true }) {
@@ -233,9 +239,11 @@ impl Guide {
         for setting in Setting::all().filter(|&setting| settings.get(setting) != setting.default()) {
             say!("    {} {} {}", name(setting), settings.get(setting), unit(setting))?;
         }
+        let mut is_open = false;
         for ManualStep { number, title, tasks, .. } in steps {
             let why = self.state.measured.open(tasks, &settings);
             if why.is_some() || !self.state.done.contains(number) {
+                is_open = true;
                 say!("  Open: step {number}, {title}{}", why.map(|why| format!(": {why}")).unwrap_or_default())?;
             }
         }
@@ -246,14 +254,13 @@ impl Guide {
         let machine = width_mm.and_then(|_| self.machine.map_or_else(|| asked(&self.state), Ok));
         let stroke_ms = self.state.measured.stroke_ms(&settings);
         let expected = machine.and_then(|machine| simulated::expected(&settings, &machine, stroke_ms));
-        say!("  Expected: {}", expected.unwrap_or_else(|error| format!("not calculated, because {error:#}")))?;
+        let if_open = if is_open { ", if the open steps change nothing" } else { "" };
+        say!("  Expected{if_open}: {}", expected.unwrap_or_else(|error| format!("not calculated, because {error:#}")))?;
         say!("  The measurements are in {}.", self.path.display())?;
+        if is_open {
+            return say!("  Next, do the open steps: the same command asks for them.");
+        }
         say!("  Next, read docs/work.md (in a release: manual/docs/work.md).")
-    }
-
-    fn tool_width_mm(&self) -> Option<f64> {
-        let of_machine = self.machine.and_then(|machine| input(&machine, TOOL_WIDTH));
-        of_machine.map(|input| input.value).or_else(|| self.state.asked.get(TOOL_WIDTH).copied())
     }
 
     fn keep(&self) -> Result<()> {
@@ -335,21 +342,47 @@ impl Guide {
                 to_set.push(setting);
             }
         }
-        self.set(&to_set, &calculated).map(drop)
+        self.set(&to_set, &calculated)
     }
 
-    /// Asks for settings until they do not contradict the others, and sets them.
-    fn set(&mut self, to_set: &[Setting], calculated: &[(Setting, u16)]) -> Result<Vec<(Setting, u16)>> {
+    /// Asks for settings, and sets them.
+    fn set(&mut self, to_set: &[Setting], calculated: &[(Setting, u16)]) -> Result<()> {
+        let wanted = self.values(to_set, calculated)?;
+        self.agree(wanted, false).map(drop)
+    }
+
+    /// Asks for these settings. Enter takes the calculated value, or else the present one.
+    fn values(&mut self, to_set: &[Setting], calculated: &[(Setting, u16)]) -> Result<Vec<(Setting, u16)>> {
+        let offered = |setting| calculated.iter().find(|(offered, _)| *offered == setting).map(|&(_, value)| value);
+        to_set.iter().map(|&setting| Ok((setting, self.value(setting, offered(setting))?))).collect()
+    }
+
+    /// Sets these settings. While they contradict the others, asks for them again, unless they `are_measured`, and for a lower top
+    /// speed that would do.
+    fn agree(&mut self, mut wanted: Vec<(Setting, u16)>, are_measured: bool) -> Result<Vec<(Setting, u16)>> {
         loop {
-            let mut wanted = Vec::new();
-            for &setting in to_set {
-                let offered = calculated.iter().find(|(offered, _)| *offered == setting).map(|&(_, value)| value);
-                wanted.push((setting, self.value(setting, offered)?));
-            }
             let pushed = self.push(&wanted);
             match pushed.as_ref().map_err(Error::downcast_ref) {
                 Err(Some(error @ SettingsError::Contradiction(_))) if !wanted.is_empty() => tell!("  error: {error}"),
                 _ => return pushed.map(|()| wanted),
+            }
+            wanted.retain(|&(setting, _)| setting != Setting::TopSpeedMmS);
+            if !are_measured {
+                let to_set: Vec<Setting> = wanted.iter().map(|&(setting, _)| setting).collect();
+                wanted = self.values(&to_set, &wanted)?;
+            }
+            // A near beam or a long lead leaves the tool little time.
+            let mut after = settings::read(&mut self.link)?;
+            for &(setting, value) in &wanted {
+                // It is in its range.
+                let _ = after.set(setting, value);
+            }
+            match allowed_top_speed(&after) {
+                Ok(allowed_mm_s) if allowed_mm_s < after.get(Setting::TopSpeedMmS) => {
+                    wanted.extend(self.values(&[Setting::TopSpeedMmS], &[(Setting::TopSpeedMmS, allowed_mm_s)])?);
+                }
+                Err(_) if are_measured => return pushed.map(|()| wanted),
+                _ => {}
             }
         }
     }
@@ -360,63 +393,6 @@ impl Guide {
         let ended = self.go("The lines come here. When each plant gives one");
         self.watches = false;
         ended
-    }
-
-    /// The stroke, leads and zone that follow from the user's arm, tool and servo. Empty if the user types them.
-    fn calculated(&mut self) -> Result<Vec<(Setting, u16)>> {
-        let machine = match self.machine {
-            Some(machine) => machine,
-            None => {
-                let question = "Calculate them from your arm, tool and servo, or type them: yes, no";
-                let is_yes = |typed: &str| match typed.to_lowercase().as_str() {
-                    "yes" | "y" => Ok(true),
-                    "no" | "n" => Ok(false),
-                    _ => Err("type yes or no, s or q".to_owned()),
-                };
-                if !self.ask_for(question, Some("yes"), is_yes)? {
-                    return Ok(Vec::new());
-                }
-                for (name, question) in ASKED {
-                    self.measure(name, question)?;
-                }
-                asked(&self.state)?
-            }
-        };
-        take_arm(&mut self.state.measured, &machine);
-        let torque = Design::of(&machine)?.servo_torque;
-        let swing = match Swing::fitted(&machine, torque, &settings::read(&mut self.link)?) {
-            Ok(swing) => swing,
-            Err(problem) => {
-                tell!("  The tool cannot swing as it has to: {problem}.");
-                return Ok(Vec::new());
-            }
-        };
-        for sentence in swing.sentences(&machine, torque) {
-            say!("  {sentence}")?;
-        }
-        let setting = |(name, value): (&str, u32)| Some((Setting::find(name.as_bytes())?, u16::try_from(value).ok()?));
-        Ok(swing.settings().into_iter().filter_map(setting).collect())
-    }
-
-    /// Asks for the tool's width, unless the machine's file has it.
-    fn measure_tool(&mut self) -> Result<()> {
-        match self.machine {
-            Some(_) => self.go(&format!("The machine's file has {} mm", self.tool_width_mm().unwrap_or_default())),
-            None => self.measure(TOOL_WIDTH, ASKED[0].1),
-        }
-    }
-
-    /// Asks for a measure of the machine.
-    fn measure(&mut self, name: &str, question: &str) -> Result<()> {
-        let Some(input) = input(&Machine::default(), name) else { return Ok(()) };
-        let before = self.state.asked.get(name).map(f64::to_string);
-        let unit = if input.unit.is_empty() { String::new() } else { format!(", in {}", input.unit) };
-        let value = self.ask_for(&format!("{question}{unit}"), before.as_deref(), |typed| {
-            let value = typed.parse().ok().filter(|value| (input.least..=input.most).contains(value));
-            value.ok_or_else(|| format!("it has to be a number {}", input.range()))
-        })?;
-        self.state.asked.insert(name.to_owned(), value);
-        self.keep()
     }
 
     /// Sets and saves.
@@ -456,33 +432,4 @@ impl Guide {
             Err(error) => Err(error.into()),
         }
     }
-}
-
-/// A machine's value of this key of its file.
-fn input(machine: &Machine, name: &str) -> Option<Input> {
-    machine.inputs().into_iter().find(|input| format!("{}.{}", input.section, input.key) == name)
-}
-
-/// A measure as a line of a machine file.
-fn written(name: &str, value: f64) -> String {
-    let input = input(&Machine::default(), name);
-    input.map_or_else(String::new, |input| format!("{name} = {}\n", Input { value, ..input }.written()))
-}
-
-/// The machine of the measures that were asked. The rest is the paper's, with a blade for which the default leads hold.
-fn asked(state: &State) -> Result<Machine> {
-    let mut measures = BTreeMap::from([("intra_row.blade_height".to_owned(), 2.5)]);
-    measures.extend(state.asked.clone());
-    let text: String = measures.iter().map(|(key, value)| written(key, *value)).collect();
-    Ok(mechanics::file::parse(Path::new("the machine"), &text)?)
-}
-
-/// Calculates leads and margin with a machine's arm and blade.
-fn take_arm(measured: &mut SetUp, machine: &Machine) {
-    let tool_mm = MM.value(machine.intra_row.width).ceil() as u16;
-    measured.trailing_tool_mm = (machine.swing.arm_trails > 0).then_some(tool_mm);
-    let length_mm = MM.value(machine.intra_row.shank_length);
-    let ms_for_90 = 1500.0 * SECOND.value(machine.swing.servo_time_60);
-    let blade_length_mm = MM.value(machine.intra_row.blade_base);
-    measured.arm = Arm { length_mm, us_for_90: machine.swing.pulse_for_90, ms_for_90, blade_length_mm };
 }

@@ -75,9 +75,27 @@ pub fn explain(contradiction: Contradiction) -> String {
                 .to_owned()
         }
         Contradiction::BeamTooNear { needed_mm } => format!(
-            "margin_mm, lead_out_ms, beam_response_ms and top_speed_mm_s together need a beam_to_tool_mm of {needed_mm} or \
+            "margin_mm, stem_zone_mm, lead_out_ms, beam_response_ms and top_speed_mm_s together need a beam_to_tool_mm of {needed_mm} or \
              more: raise it, or lower one of them"
         ),
+    }
+}
+
+/// A lower top speed is a multiple of this, mm/s. That leaves some room for a longer lead.
+pub const SPEED_STEP_MM_S: u16 = 50;
+
+/// The highest top speed that does not contradict the other settings, in mm/s: theirs, or a lower one.
+///
+/// # Errors
+/// What is contradicted at the lowest top speed too.
+pub fn allowed_top_speed(settings: &Settings) -> Result<u16, Contradiction> {
+    let mut slower = settings.clone();
+    loop {
+        let mm_s = slower.get(Setting::TopSpeedMmS);
+        let Some(contradiction) = slower.contradiction() else { return Ok(mm_s) };
+        if slower.set(Setting::TopSpeedMmS, (mm_s - 1) / SPEED_STEP_MM_S * SPEED_STEP_MM_S).is_err() {
+            return Err(contradiction);
+        }
     }
 }
 
@@ -190,7 +208,9 @@ pub fn other_version(version: &str, lines: &[String]) -> Option<String> {
             format!("the firmware {version} is newer than this program, {OWN}: take the `weeder` of that version")
         }
         Ordering::Less => {
-            format!("the firmware {version} is older than this program, {OWN}: `weeder flash` brings this version")
+            format!(
+                "the firmware {version} is older than this program, {OWN}: save its settings by `weeder settings pull FILE.toml`, then `weeder flash` brings this version"
+            )
         }
         Ordering::Equal if others.is_empty() && missing.is_empty() => return None,
         Ordering::Equal => format!("the firmware {version} has other settings than this program of the same number"),

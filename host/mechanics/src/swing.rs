@@ -25,7 +25,7 @@ mod sentences;
 use crate::arm::{SwungArm, turn_ms};
 use crate::machine::{Machine, SwingInputs};
 use crate::unit::{KG_CM, MM};
-use link::settings::{Setting, Settings, explain, name};
+use link::settings::{Setting, Settings, allowed_top_speed, explain, name};
 use serde::Serialize;
 use set_up::{circle, saved_ms};
 use uom::si::f64::{Time, Torque};
@@ -48,9 +48,6 @@ const BLADE_IN_DEFAULT_MM: f64 = 23.0;
 
 /// Pulses are whole steps of this, us, rounded outwards.
 const PULSE_STEP_US: f64 = 5.0;
-
-/// A lower top speed is a multiple of this, mm/s. That leaves some room for a longer lead.
-const SPEED_STEP_MM_S: u16 = 50;
 
 /// The required swing.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -220,14 +217,7 @@ impl Swing {
             }
         }
         let board_mm_s = settings.get(Setting::TopSpeedMmS);
-        let speeds = (Setting::TopSpeedMmS.least()..=board_mm_s).rev();
-        let mut speeds = speeds.filter(|mm_s| *mm_s == board_mm_s || mm_s.is_multiple_of(SPEED_STEP_MM_S));
-        let allowed_mm_s = speeds.find(|&mm_s| {
-            // It is in its range.
-            let _ = after.set(Setting::TopSpeedMmS, mm_s);
-            after.contradiction().is_none()
-        });
-        let allowed_mm_s = allowed_mm_s.ok_or_else(|| after.contradiction().map(explain).unwrap_or_default())?;
+        let allowed_mm_s = allowed_top_speed(&after).map_err(explain)?;
         Ok(Self {
             stem_zone_mm: stem_zone_mm as u32,
             angle_degrees,

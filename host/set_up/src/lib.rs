@@ -66,6 +66,9 @@ const SLOW_M_S: f64 = 1.0 / 3.6;
 /// share keeps the damage below 1 plant in 10,000.
 const STEM_SHARE: f64 = 0.088;
 
+/// What to do if the servo's times need too great a margin.
+pub const SEE_TO_SERVO: &str = "see to the servo, its times differ too much";
+
 /// The measurements of a machine in a session.
 #[derive(Clone, Debug, Default)]
 pub struct SetUp {
@@ -139,7 +142,16 @@ impl SetUp {
             lines.extend(["> calibrate 10000".to_owned(), format!("ticks_per_m={ticks}")]);
         }
         lines.extend(self.slip_permille.iter().rev().map(|permille| format!("slip permille={permille}")));
+        if self.sets_margin {
+            let margin = Setting::MarginMm;
+            lines.push(format!("> set {} {}", margin.text(), self.settings.get(margin)));
+        }
         lines
+    }
+
+    /// Forgets how long the servo took.
+    pub fn forget_timings(&mut self) {
+        self.timings.clear();
     }
 
     /// Listens to what happened.
@@ -302,9 +314,7 @@ impl SetUp {
         Err(vec![Step::MeasureAgain(
             least_mm,
             match margin {
-                Margin { servo_mm, .. } if servo_mm > slip_mm.max(arm_mm).max(blade_mm) => {
-                    "see to the servo, its times differ too much"
-                }
+                Margin { servo_mm, .. } if servo_mm > slip_mm.max(arm_mm).max(blade_mm) => SEE_TO_SERVO,
                 _ if blade_mm > slip_mm.max(arm_mm) => "take a blade that is shorter along the row",
                 _ if arm_mm > slip_mm => "shorten the trailing arm's stroke",
                 _ if second_beam_mm > 0.0 => "roll past more plants",

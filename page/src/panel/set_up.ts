@@ -3,7 +3,7 @@
 
 import { module } from "../core.ts";
 import { make, makeButton, type Parts, plain } from "../dom.ts";
-import { read } from "../link/grammar.ts";
+import { steps as order, read } from "../link/grammar.ts";
 import type { Ask, Happening } from "../link/session.ts";
 import { Rust } from "../rust.ts";
 import { ended, language, type Plain, quantity, say, show, table, told } from "../words/words.ts";
@@ -160,13 +160,29 @@ export class SetUp {
         return [...parts, said];
     }
 
+    /**
+     * Saves a step's values, in an order without intermediate contradictions. If the result contradicts itself, nothing is sent: a part
+     * of a step can be worse than none.
+     */
     async #save(names: readonly string[]): Promise<void> {
-        for (const name of names) {
+        const typed = names.flatMap((name) => {
             const input = this.#inputs.get(name);
-            if (input?.dataset.typed === undefined) continue;
-            await this.ask(`set ${name} ${input.value}`);
-            delete input.dataset.typed;
-        }
+            return input?.dataset.typed === undefined ? [] : [{ name, input }];
+        });
+        // The machine says what would be right.
+        const wrong = typed.find(({ name, input }) => {
+            const setting = this.machine.settings.find((setting) => setting.name === name);
+            const value = /^\d+$/.test(input.value) ? Number(input.value) : Number.NaN;
+            return setting && !(setting.least <= value && value <= setting.greatest);
+        });
+        if (wrong) await this.ask(`set ${wrong.name} ${wrong.input.value}`);
+        const wanted = new Map(typed.map(({ name, input }) => [name, Number(input.value)]));
+        const { contradiction, steps } = order(this.machine.settings, wanted);
+        // Settings that already contradict each other are corrected one at a time.
+        const isContradicted = order(this.machine.settings, new Map()).contradiction !== undefined;
+        if (contradiction && !isContradicted) throw new Error(contradiction);
+        for (const [name, value] of contradiction ? wanted : steps) await this.ask(`set ${name} ${value}`);
+        for (const { input } of typed) delete input.dataset.typed;
         await this.ask("save");
     }
 }

@@ -1,11 +1,12 @@
 //! The measurements of a set-up: the servo's times, the wheel, and the margin that follows from them.
 
-use super::{End, Guide};
+use super::{End, Guide, yes_or_no};
 use anyhow::{Error, Result, bail};
 use frame::{say, tell};
-use link::settings::{self, Setting, name};
+use link::settings::{self, Setting, name, range};
 use link::{EventLine, Mode, Status};
-use set_up::{SetUp, Step};
+use set_up::{SEE_TO_SERVO, SetUp, Step};
+use std::io::{self, IsTerminal};
 use std::sync::mpsc::RecvTimeoutError;
 use std::thread;
 use std::time::{Duration, Instant};
@@ -29,6 +30,12 @@ const ROLLS_MM_S: u32 = 15;
 
 const END_SWITCH: &str = "An end switch on D5 times the servo by itself: on, off";
 
+/// What is seen of six swings without an end switch, as docs/calibration.md has it.
+const SEEN: [(Setting, &str); 2] = [
+    (Setting::LeadOutMs, "The longest time from a swing's begin until the tool was out, in ms"),
+    (Setting::LeadInMs, "The shortest time from a command in until the tool began to move, in ms"),
+];
+
 impl Guide {
     /// Times the servo until there are enough measurements over the present stroke.
     pub(super) fn time_servo(&mut self) -> Result<()> {
@@ -50,6 +57,9 @@ impl Guide {
             let from = self.stands_at(None)?;
             if self.ask("calibrate servo")?.is_none() {
                 continue;
+            }
+            if io::stdin().is_terminal() {
+                say!("  The tool swings six times. Enter ends that at once.")?;
             }
             let Some((event, line)) = self.swings(from)? else { continue };
             match event {
@@ -78,7 +88,8 @@ impl Guide {
                     self.state.measured.take_line(&line);
                 }
                 _ => {
-                    let leads = self.set(&[Setting::LeadOutMs, Setting::LeadInMs], &[])?;
+                    let seen = self.seen()?;
+                    let leads = self.agree(seen, true)?;
                     self.state.measured.take_line(&line);
                     for (lead, ms) in leads {
                         self.state.measured.take_line(&format!("> set {} {ms}", name(lead)));
@@ -86,6 +97,26 @@ impl Guide {
                 }
             }
             self.keep()?;
+        }
+    }
+
+    /// Asks for the times that the user saw. Nothing is offered: what was calculated is no measurement.
+    fn seen(&mut self) -> Result<Vec<(Setting, u16)>> {
+        loop {
+            let mut seen = Vec::new();
+            for (lead, question) in SEEN {
+                let ms = self.ask_for(question, None, |typed| {
+                    let value = typed.parse().ok().filter(|value| lead.allows(*value));
+                    value.ok_or_else(|| format!("it has to be a whole number, {}", range(lead)))
+                })?;
+                seen.push((lead, ms));
+            }
+            let [(_, out_ms), (_, in_ms)] = seen[..] else { continue };
+            let question =
+                format!("Out after {out_ms} ms, and on its way back after {in_ms} ms. Is that right: yes, no");
+            if self.ask_for(&question, Some("yes"), yes_or_no)? {
+                return Ok(seen);
+            }
         }
     }
 
@@ -118,6 +149,10 @@ impl Guide {
                     _ => {}
                 }
             }
+            // Piped lines answer later questions.
+            if io::stdin().is_terminal() && self.end_swings()? {
+                return Ok(None);
+            }
             has_moved = settings::status(&mut self.link)?.speed_mm_s.unsigned_abs() >= ROLLS_MM_S;
         }
         let has_moved = has_moved || settings::status(&mut self.link)?.position != from;
@@ -127,6 +162,16 @@ impl Guide {
             tell!("  The machine has not reported the swings within {} seconds.", SWINGS.as_secs());
         }
         Ok(None)
+    }
+
+    /// Ends the swings if the user has typed anything, and returns whether that is so.
+    fn end_swings(&mut self) -> Result<bool> {
+        let typed = self.obey_typed();
+        if !matches!(typed, Ok(false)) {
+            self.link.ask("hold")?;
+            say!("  The swings are ended, and the tool is out.")?;
+        }
+        typed
     }
 
     /// Waits until the machine stands, and returns its position. With `from`, it must first have left that position.
@@ -152,6 +197,7 @@ impl Guide {
                 }
                 self.obey_typed()?;
             }
+            self.obey_ctrl_c()?;
             before = Some(position);
             thread::sleep(POLL);
         }
@@ -229,8 +275,18 @@ impl Guide {
                 }
                 Err(missing) => {
                     let [Step::PassPlants(_)] = missing[..] else {
-                        for step in missing {
+                        for step in &missing {
                             say!("  Missing: {step}")?;
+                        }
+                        // A slip of the finger, for example.
+                        if let [Step::MeasureAgain(_, SEE_TO_SERVO)] = missing[..]
+                            && self.ask_for(
+                                "Forget the servo's times, and time it again: yes, no",
+                                Some("no"),
+                                yes_or_no,
+                            )?
+                        {
+                            self.state.measured.forget_timings();
                         }
                         return say!("  The margin stays at {} mm.", settings.get(Setting::MarginMm));
                     };

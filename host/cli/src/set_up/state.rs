@@ -4,6 +4,7 @@ use anyhow::{Result, bail};
 use frame::tell;
 use link::row_names::Board;
 use link::settings::{Setting, name};
+use mechanics::machine::{Input, Machine};
 use set_up::SetUp;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -14,7 +15,7 @@ pub(super) struct State {
     /// The board, in words. Empty in a new file.
     board: String,
     pub(super) done: BTreeSet<usize>,
-    /// The user's measures in a machine file's units, by section and key.
+    /// The machine's measures, asked or of a file, in a machine file's units, by section and key.
     pub(super) asked: BTreeMap<String, f64>,
     /// With the board's settings as they were last.
     pub(super) measured: SetUp,
@@ -61,6 +62,13 @@ impl State {
         lines.extend(Setting::all().map(value));
         lines.push(String::new());
         lines.join("\n")
+    }
+
+    /// Keeps a machine file's measures: a later call may come without the file.
+    pub(super) fn take_machine(&mut self, machine: &Machine) {
+        // Conversions leave a last digit.
+        let measure = |input: Input| (format!("{}.{}", input.section, input.key), (input.value * 1e6).round() / 1e6);
+        self.asked.extend(machine.inputs().into_iter().map(measure));
     }
 
     /// Takes the board that is there. Fails if the file belongs to a board with another serial number.

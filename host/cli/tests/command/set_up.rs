@@ -357,7 +357,7 @@ fn without_a_machine_s_file_its_measures_are_asked_and_nothing_else_is_offered()
     let folder = TempDir::new().expect("there is room for a folder");
     let (_uno, _) = uno(folder.path(), &["--stand", "--link", "uno"]);
     // Step 2 with a beam that is too near at first, and with an encoder of 500 lines.
-    let mut input = vec!["", "s", "", "300", "", "", "", "2000", "90", "s"];
+    let mut input = vec!["", "s", "", "300", "", "", "400", "2000", "1300", "90", "s"];
     // Step 5 by a person's own measures, one of them out of range at first.
     input.extend([
         "maybe", "", "", "300", "20", "25", "2.5", "0.3", "40", "0.2", "800", "900", "80", "20", "15", "", "", "", "",
@@ -406,9 +406,9 @@ fn of_two_timings_by_eye_the_safest_times_are_set_and_one_that_is_left_out_does_
     let folder = TempDir::new().expect("there is room for a folder");
     let (_uno, _) = uno(folder.path(), &["--stand", "--fast", "--link", "uno"]);
     let to_step_6 = ["s", "s", "s", "s", "s", "off", ""];
-    let first = answered(folder.path(), &[&[""][..], &to_step_6, &["190", "50", "", "s", "s"]].concat());
+    let first = answered(folder.path(), &[&[""][..], &to_step_6, &["190", "50", "", "", "s", "s"]].concat());
     assert!(first.contains("Open: step 6, Time the servo: time the servo: `calibrate servo` (1 of 2 done)"), "{first}");
-    let second = answered(folder.path(), &[&to_step_6[..], &["140", "80", "s"]].concat());
+    let second = answered(folder.path(), &[&to_step_6[..], &["140", "800", "80", "", "s"]].concat());
     assert!(!second.contains("Open: step 6"), "{second}");
     for line in ["    lead_out_ms 190 ms\n", "    lead_in_ms 50 ms\n"] {
         assert!(second.contains(line), "{line:?} is not in\n{second}");
@@ -419,9 +419,36 @@ fn of_two_timings_by_eye_the_safest_times_are_set_and_one_that_is_left_out_does_
 fn a_lead_that_contradicts_the_others_is_asked_again_and_the_timing_counts() {
     let folder = TempDir::new().expect("there is room for a folder");
     let (_uno, _) = uno(folder.path(), &["--stand", "--fast", "--link", "uno"]);
-    let said = answered(folder.path(), &["", "s", "s", "s", "s", "s", "off", "", "450", "40", "190", "50", "q"]);
+    let said = answered(folder.path(), &["", "s", "s", "s", "s", "s", "off", "", "450", "40", "", "550", "q"]);
     for words in ["together need a beam_to_tool_mm of ", "time the servo: `calibrate servo` (1 of 2 done)"] {
         assert!(said.contains(words), "{words:?} is not in\n{said}");
+    }
+}
+
+#[test]
+fn a_near_beam_is_offered_with_a_lower_top_speed_and_what_is_open_comes_before_work() {
+    let folder = TempDir::new().expect("there is room for a folder");
+    let (_uno, _) = uno(folder.path(), &["--stand", "--link", "uno"]);
+    let said = answered(folder.path(), &["", "s", "", "300", "", "", "", "", "", "s", "s", "s", "s", "s", "s"]);
+    assert!(said.contains("beam_to_tool_mm in mm, now 400 [300]: "), "{said}");
+    assert!(said.contains("top_speed_mm_s in mm/s, now 1300 [950]: "), "{said}");
+    assert!(said.contains("    beam_to_tool_mm 300 mm\n") && said.contains("    top_speed_mm_s 950 mm/s\n"), "{said}");
+    assert!(said.contains("  Next, do the open steps: the same command asks for them.\n"), "{said}");
+}
+
+#[test]
+fn a_call_without_the_machine_s_file_knows_the_machine_of_the_call_before() {
+    let folder = TempDir::new().expect("there is room for a folder");
+    let (_uno, _) = uno(folder.path(), &["--stand", "--link", "uno"]);
+    fs::write(folder.path().join("my.toml"), "[intra_row]\nblade_base = \"60 mm\"\n[swing]\narm_trails = 1\n")
+        .expect("there is room for a file");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
+    command.current_dir(&folder).args(["set-up", "--port", "./uno", "--machine", "my.toml"]);
+    printed(&typed(&mut command, "\ns\ns\n\nq\n"), 0);
+    answered(folder.path(), &["q"]);
+    let kept = fs::read_to_string(folder.path().join("set-up.txt")).expect("it is there");
+    for line in ["machine intra_row.blade_base 60\n", "machine swing.arm_trails 1\n"] {
+        assert!(kept.contains(line), "{line:?} is not in\n{kept}");
     }
 }
 

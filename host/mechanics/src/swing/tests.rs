@@ -1,5 +1,6 @@
 use super::*;
 use crate::unit::{KG, KM_H, SECOND};
+use link::settings::SPEED_STEP_MM_S;
 
 fn with_tool_of_100_mm() -> Machine {
     let mut machine = Machine::default();
