@@ -1,10 +1,11 @@
 //! `weeder train`: trains an example table from labelled detections, and reports how well it separates plants from
 //! weeds.
 
-use anyhow::{Result, bail, ensure};
+use anyhow::{Error, Result, bail, ensure};
 use clap::builder::TypedValueParser;
 use clap::{ArgGroup, Args};
 use control::{ground::examples, settings::Setting};
+use field::row::Kind;
 use frame::{
     OutFile, OutName, Replace, say,
     source::{self, offering},
@@ -12,7 +13,9 @@ use frame::{
 };
 use link::examples::CAPACITY;
 use serde_json::{Value, json};
+use std::fmt::{self, Display, Formatter};
 use std::path::{Path, PathBuf};
+use study::statistics::Share;
 use study::training::synthetic::{CROPS, Crop};
 use study::training::{
     self, Beside, Confusion, DEFAULT_MOST_EXAMPLES, Labelled, MOST_EXAMPLES, Training, listing, regions, synthetic,
@@ -106,12 +109,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         return beside(arguments, table.as_ref(), &objects);
     }
     let training = training::train(&objects, arguments.k, arguments.max)?;
-    let seed = arguments.seed.wrapping_add(1);
-    let another = arguments.synthetic.then(|| synthetic::objects(arguments.crop, seed)).transpose()?;
-    let another_field = another.map(|objects| (seed, training.model().classify(&objects)));
+    let fresh = Fresh::of(arguments, &training, &objects)?;
     let printed = match arguments.json {
-        true => say!("{:#}", in_json(&training, &objects, another_field.as_ref())),
-        false => report(&training, &objects, another_field.as_ref()),
+        true => say!("{:#}", in_json(&training, &objects, &fresh)),
+        false => report(&training, &objects, &fresh),
     };
     tell_k(training.k);
     if let Some(plants) = training.forgotten() {
@@ -215,8 +216,55 @@ fn tell_k(k: u8) {
     }
 }
 
-/// The report of a training. `another_field` has the seed of another field and the classification of its detections.
-fn report(training: &Training, objects: &[Labelled], another_field: Option<&(u64, Confusion)>) -> Result<()> {
+/// What a table does with detections that it was not learned from.
+enum Fresh {
+    /// Those of another simulated field, with this seed.
+    AnotherField(u64, Confusion),
+    /// Those that were held out.
+    HeldOut(Confusion),
+    /// None: why the rest teaches no table.
+    None(Error),
+}
+
+impl Fresh {
+    fn of(arguments: &Arguments, training: &Training, objects: &[Labelled]) -> Result<Self> {
+        if !arguments.synthetic {
+            let held_out = training::held_out(objects, arguments.k, arguments.max);
+            return Ok(held_out.map_or_else(Self::None, Self::HeldOut));
+        }
+        let seed = arguments.seed.wrapping_add(1);
+        let another = synthetic::objects(arguments.crop, seed)?;
+        Ok(Self::AnotherField(seed, training.model().classify(&another)))
+    }
+}
+
+impl Display for Fresh {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let classified = match self {
+            Self::AnotherField(seed, classified) => {
+                writeln!(f, "Detections of another field (seed {seed}), classified by the table\n")?;
+                classified
+            }
+            Self::HeldOut(classified) => {
+                writeln!(f, "Held out: each fifth of the detections, classified by a table of the others\n")?;
+                classified
+            }
+            Self::None(why) => {
+                return write!(f, "Held out: nothing, so nothing tells how the table does in the field: {why}");
+            }
+        };
+        let plants = Share::of(classified.plants_taken_for_weeds() as u64, classified.count(Kind::Plant) as u64);
+        writeln!(f, "{classified}")?;
+        write!(
+            f,
+            "With 95 % confidence, {:.2} % of the plants at most are classified as weeds",
+            plants.greatest_percent
+        )
+    }
+}
+
+/// The report of a training.
+fn report(training: &Training, objects: &[Labelled], fresh: &Fresh) -> Result<()> {
     say!("Detections  {}", objects.len())?;
     say!("k           {}", training.k)?;
     say!("Radius      {} (squared distance beyond which a detection is unknown)", training.radius)?;
@@ -227,14 +275,14 @@ fn report(training: &Training, objects: &[Labelled], another_field: Option<&(u64
     say!("Taken out   {} as noise", training.edited_out)?;
     say!("Examples    {} kept", training.kept.len())?;
     say!("\nBefore condensing: each detection classified by all others\n\n{}", training.leave_one_out)?;
-    say!("\nAfter condensing: all detections classified by the table\n\n{}", training.by_table)?;
-    if let Some((seed, classified)) = another_field {
-        say!("\nDetections of another field (seed {seed}), classified by the table\n\n{classified}")?;
-    }
-    say!("")
+    say!(
+        "\nAfter condensing: the detections that it was learned from, classified by the table\n\n{}",
+        training.by_table
+    )?;
+    say!("\n{fresh}\n")
 }
 
-fn in_json(training: &Training, objects: &[Labelled], another_field: Option<&(u64, Confusion)>) -> Value {
+fn in_json(training: &Training, objects: &[Labelled], fresh: &Fresh) -> Value {
     let scale = table::COLUMNS.iter().zip(training.ranges);
     let scale = scale.map(|(column, range)| ((*column).to_owned(), json!([range.lowest, range.highest])));
     json!({
@@ -246,7 +294,14 @@ fn in_json(training: &Training, objects: &[Labelled], another_field: Option<&(u6
         "examples": training.kept.len(),
         "before_condensing": counts_in_json(&training.leave_one_out),
         "after_condensing": counts_in_json(&training.by_table),
-        "another_field": another_field.map(|(_, classified)| counts_in_json(classified)),
+        "another_field": match fresh {
+            Fresh::AnotherField(_, classified) => Some(counts_in_json(classified)),
+            _ => None,
+        },
+        "held_out": match fresh {
+            Fresh::HeldOut(classified) => Some(counts_in_json(classified)),
+            _ => None,
+        },
     })
 }
 

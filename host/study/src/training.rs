@@ -166,6 +166,26 @@ pub fn train(objects: &[Labelled], k: Option<u8>, most: usize) -> Result<Trainin
     Err(refused.context(NO_OBJECTS)?)
 }
 
+/// Into how many parts the detections are divided, to hold out one after the other.
+const PARTS: usize = 5;
+
+/// Detections that a table was not learned from: each fifth of them, classified by a table of the others. The table of
+/// all is learned from some more.
+///
+/// # Errors
+/// As [`train`], if four fifths teach nothing.
+pub fn held_out(objects: &[Labelled], k: Option<u8>, most: usize) -> Result<Confusion> {
+    let mut classified = Vec::new();
+    for part in 0..PARTS {
+        let in_part = |index: &usize| index % PARTS == part;
+        let (held, rest): (Vec<usize>, Vec<usize>) = (0..objects.len()).partition(in_part);
+        let rest: Vec<Labelled> = rest.into_iter().map(|index| objects[index]).collect();
+        let model = train(&rest, k, most)?.model();
+        classified.extend(held.into_iter().map(|index| (objects[index].kind, model.class(&objects[index].features))));
+    }
+    Ok(classified.into_iter().collect())
+}
+
 /// Examples to teach in the field, in addition to the built-in ones.
 #[derive(Clone, Debug)]
 pub struct Beside {

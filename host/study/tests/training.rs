@@ -16,7 +16,9 @@ use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use study::training::synthetic::CROPS;
 use study::training::table::{read, read_labelled};
-use study::training::{DEFAULT_MOST_EXAMPLES, Labelled, Model, beside, label_of, listing, regions, synthetic, train};
+use study::training::{
+    DEFAULT_MOST_EXAMPLES, Labelled, Model, beside, held_out, label_of, listing, regions, synthetic, train,
+};
 use tempfile::TempDir;
 
 /// Allowed shares of plants classified as weeds, and of weeds classified as plants.
@@ -147,6 +149,35 @@ fn a_few_plants_among_many_weeds_are_never_taken_for_noise() {
         }
     }
     assert!(written > 290 && cut < 3, "{written} tables, {cut} cut a plant");
+}
+
+#[test]
+fn what_was_held_out_tells_what_a_table_does_with_other_detections() {
+    const DRAWS: u64 = 12;
+    let most = 120;
+    let [mut told, mut of_others, mut of_its_own] = [0.0; 3];
+    for seed in 0..DRAWS {
+        let mut chance = ChaCha8Rng::seed_from_u64(seed);
+        let mut some = |count: usize| -> Vec<Labelled> {
+            let mut one = |number: usize| {
+                let (kind, widths_mm) =
+                    if number.is_multiple_of(2) { (Kind::Plant, 36..=80) } else { (Kind::Weed, 8..=38) };
+                labelled(kind, 556, chance.random_range(400..500), chance.random_range(widths_mm))
+            };
+            (0..count).map(&mut one).collect()
+        };
+        let (known, others) = (some(200), some(2000));
+        let training = train(&known, None, most).unwrap();
+        let held_out = held_out(&known, None, most).unwrap();
+        assert_eq!([Kind::Plant, Kind::Weed].map(|kind| held_out.count(kind)), [100, 100]);
+        let share = |weeds: usize, of: usize| weeds as f64 / of as f64 / DRAWS as f64;
+        told += share(held_out.weeds_left(), 100);
+        of_others += share(training.model().classify(&others).weeds_left(), 1000);
+        of_its_own += share(training.by_table.weeds_left(), 100);
+    }
+    let shares = format!("{told:.2} of those held out, {of_others:.2} of others, {of_its_own:.2} of its own");
+    assert!((told - of_others).abs() < 0.1 && of_others - of_its_own > 0.2, "{shares}");
+    println!("{shares}");
 }
 
 #[test]

@@ -261,7 +261,7 @@ export const words = {
 
     // Examples.
     teachLead:
-        "Roll past a plant or a tall weed in hold, and label it with the two buttons. The label counts from the next detection on, and is saved at once.",
+        "Roll past a plant or a tall weed in hold, and label it with the two buttons. The label votes from the next detection on, and is saved at once. One label changes little: for plants that are taken for weeds, fill 24 places or more.",
     places: "{count} of {all} places are taken.",
     forgetAll: "Forget all",
     forget: "Forget",
@@ -448,7 +448,7 @@ export const heard = {
     contradictEncoder:
         "a wheel has to give 900 ticks a metre or more, or a failing encoder is found too late: ticks_per_m, and the value from ticks_per_rev and wheel_mm, must reach that; ticks_per_rev is four times the encoder's lines: if it is, take more lines or a smaller wheel",
     contradictBeam:
-        "margin_mm, lead_out_ms, beam_response_ms and top_speed_mm_s together need a beam_to_tool_mm of {needed} or more: raise it, or lower one of them",
+        "margin_mm, stem_zone_mm, lead_out_ms, beam_response_ms and top_speed_mm_s together need a beam_to_tool_mm of {needed} or more: raise it, or lower one of them",
 
     // The next step of the set-up, the parts of a margin, and warnings (host/set_up/src/).
     timeServo: "time the servo: `calibrate servo` ({done} of {all} done)",
