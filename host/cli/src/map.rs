@@ -4,6 +4,7 @@ use crate::receiver::AntennaArguments;
 use anyhow::Result;
 use clap::Args;
 use comfy_table::{Table, presets};
+use field::counted;
 use frame::{OutName, Replace, number_within, print, say, source, tell};
 use gps::summary::{Stand, Summary};
 use gps::wheel::Ratio;
@@ -66,7 +67,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     for path in &arguments.logs {
         let log = log::read(path)?;
         has_receiver |= log.iter().any(|entry| matches!(entry.kind, Kind::GpsFound | Kind::Gps | Kind::GpsDamaged));
-        jobs.push((name(path, &arguments.logs), Job::read(&log, &wanted)));
+        let (name, job) = (name(path, &arguments.logs), Job::read(&log, &wanted));
+        if job.without_wheel > 0 {
+            tell!(
+                "{name}: the wheel of {} is unknown, and nothing is counted there: the log lacks the settings, or has one that this version does not allow",
+                counted(job.without_wheel as usize, "status line")
+            );
+        }
+        jobs.push((name, job));
     }
     let counted: Vec<(&str, Summary)> =
         jobs.iter().map(|(name, job)| (name.as_str(), Summary::of(job, &stand))).collect();

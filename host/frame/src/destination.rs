@@ -19,6 +19,7 @@ use std::ffi::OsString;
 use std::fs;
 use std::io::{ErrorKind, Write};
 use std::path::{self, Path, PathBuf};
+use std::sync::OnceLock;
 
 /// Endings of files that commands write. A folder's name hardly ends so.
 const FILE_ENDINGS: [&str; 9] = ["csv", "geojson", "hex", "html", "json", "rs", "svg", "toml", "vcd"];
@@ -92,6 +93,8 @@ impl OutName {
         let names: Vec<String> = names.into_iter().map(Into::into).collect();
         for path in names.iter().map(|name| folder.join(name)) {
             ensure!(!path.is_dir(), "{} is a folder, and a file would take its place", path.display());
+            let is_taken = TAKEN.get().is_some_and(|taken| taken.contains(&full(&path)));
+            ensure!(!is_taken, "{} has two uses in this command: name another folder", path.display());
             replace.check(&path)?;
             if path.exists() {
                 whole_file::check(&path).with_context(|| cannot_be_written(&path))?;
@@ -137,6 +140,9 @@ impl OutFolder {
     }
 }
 
+/// The files that the command line names, for the names of a folder, which its command knows.
+static TAKEN: OnceLock<Vec<PathBuf>> = OnceLock::new();
+
 /// Checks the files of a parsed command line. Fails, in words, if an output is also an input or another output, or if
 /// standard input is named twice. A name may not be empty: a shell's variable may be unset. A `-` that is left names no
 /// file: a parser replaces it where standard input is read.
@@ -163,6 +169,8 @@ pub(crate) fn check(words: &ArgMatches) -> Result<(), String> {
         }
         taken.push(full);
     }
+    // A process has one command line. Tests parse several.
+    let _ = TAKEN.set(taken);
     Ok(())
 }
 

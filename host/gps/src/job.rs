@@ -175,6 +175,8 @@ pub struct Job {
     pub ratios: Vec<Ratio>,
     /// Metres that the wheel spun.
     pub spun_m: f64,
+    /// Statuses that count for nothing, because no wheel is known: the log lacks the settings, or this version does not allow one.
+    pub without_wheel: u64,
 }
 
 impl Job {
@@ -212,6 +214,8 @@ impl Job {
                         receiver.rolled(entry.time_ms as f64, m, f64::from(status.speed_mm_s));
                         reading.beam_to_tool_mm = follower.in_use().settings().get(Setting::BeamToToolMm).into();
                         reading.status(status, m, entry);
+                    } else {
+                        job.without_wheel += 1;
                     }
                 }
                 Followed::Event(event) => reading.event(entry, &event, &follower),

@@ -26,7 +26,7 @@ pub enum ExamplesError {
     #[error(transparent)]
     Link(#[from] LinkError),
     #[error(
-        "the firmware has other built-in examples than this program, so its taught examples cannot be converted to millimetres: use its own `weeder` (after `weeder train`: `cargo install --locked --path host/cli`), or flash this one's firmware by `weeder flash`"
+        "the firmware has other built-in examples than this program, so its taught examples cannot be converted to millimetres: use its own `weeder` (after `weeder train`: `cargo install --locked --path host/cli`). `weeder flash` would make its examples invalid"
     )]
     OtherTable,
     #[error(

@@ -136,6 +136,9 @@ fn comment_out(document: &mut DocumentMut, kept: impl Fn(&str) -> bool) {
     document.set_trailing(trailing);
 }
 
+/// The comment above a setting that this version does not know.
+const ONLY_MACHINE: &str = "only the machine's firmware knows this setting, or this value";
+
 fn updated(path: &Path, old: &str, shown: &Shown) -> Result<String, FileError> {
     let (mut document, _) = parse(path, old)?;
     // In a file without values the comments belong to its end, and new values would go before them.
@@ -149,8 +152,17 @@ fn updated(path: &Path, old: &str, shown: &Shown) -> Result<String, FileError> {
     if !shown.missing.contains(&Setting::MergeGapMm)
         && let Some((key, item)) = document.remove_entry(OLD_MERGE_GAP)
     {
-        // Moves its comments as well.
-        document.insert_formatted(&Key::new(name(Setting::MergeGapMm)).with_leaf_decor(key.leaf_decor().clone()), item);
+        // Moves the user's comments as well. The generated ones, two lines, are of the old setting.
+        let mut decor = key.leaf_decor().clone();
+        if let Some((of_user, generated)) =
+            decor.prefix().and_then(RawString::as_str).and_then(|text| text.split_once(ONLY_MACHINE))
+        {
+            let of_user = of_user.trim_end_matches(['#', ' ']);
+            let (help, range) = (help(Setting::MergeGapMm), range(Setting::MergeGapMm));
+            let rest: String = generated.split_inclusive('\n').skip(2).collect();
+            decor.set_prefix(format!("{of_user}# {help}\n# {range}\n{rest}"));
+        }
+        document.insert_formatted(&Key::new(name(Setting::MergeGapMm)).with_leaf_decor(decor), item);
     }
     comment_out(&mut document, |key| {
         let is_known = Setting::find(key.as_bytes()).is_some_and(|setting| !shown.missing.contains(&setting));
@@ -166,8 +178,7 @@ fn updated(path: &Path, old: &str, shown: &Shown) -> Result<String, FileError> {
         } else {
             format!("{} to {} {unit}", range.start(), range.end())
         };
-        let comment =
-            format!("\n# only the machine's firmware knows this setting, or this value\n# {}\n", range.trim_end());
+        let comment = format!("\n# {ONLY_MACHINE}\n# {}\n", range.trim_end());
         (name.clone(), *value, *is_switched, comment)
     });
     for (name, value, is_switched, comment) in known.chain(foreign) {
@@ -299,6 +310,10 @@ mod tests {
         assert_eq!(gap("merge_gap_ticks = 2000\nticks_per_m = 500"), Some((Setting::MergeGapMm, 1000)));
         assert_eq!(gap("merge_gap_ticks = 40\nmerge_gap_mm = 5"), Some((Setting::MergeGapMm, 5)));
         assert!(parsed("merge_gap_ticks = 2001").unwrap_err().contains("now it is merge_gap_mm"));
+        let generated = "# mine\n\n# only the machine's firmware knows this setting, or this value\n# 0 to 2000 ticks\nmerge_gap_ticks = 40\n";
+        let new = updated(Path::new("machine.toml"), generated, &Shown::default()).unwrap();
+        assert!(new.starts_with("# mine\n\n# ") && new.contains(" mm, default 21\nmerge_gap_mm = "), "{new}");
+        assert!(!new.contains("only the machine") && !new.contains("ticks\n"), "{new}");
         let old = "# ragged leaves\nmerge_gap_ticks = 60 # three were too few\n";
         let new = updated(Path::new("machine.toml"), old, &shown(Settings::new())).unwrap();
         assert!(new.starts_with("# ragged leaves\nmerge_gap_mm = 21 # three were too few\n"), "{new}");

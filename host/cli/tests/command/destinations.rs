@@ -155,3 +155,22 @@ fn every_out_is_a_folder_or_a_file_by_its_name_in_the_help() {
         assert!(is_folder || help.contains("--out <FILE."), "{command}: {help}");
     }
 }
+
+#[test]
+fn a_folder_s_file_is_no_other_file_of_its_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |words: &[&str]| weeder(folder.path(), words);
+    assert!(run(&["sim", "--plants", "2", "--weeds", "0", "--out", "there"]).status.success());
+    let row = fs::read(folder.path().join("there/row.csv")).unwrap();
+    for words in [
+        &["sim", "--row", "there/row.csv", "--out", "there", "--force"][..],
+        &["sim", "--plants", "2", "--weeds", "0", "--out", "new", "--vcd", "new/row.csv"],
+    ] {
+        fs::create_dir_all(folder.path().join("new")).unwrap();
+        let output = run(words);
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert!(message.contains("row.csv has two uses in this command: name another folder"), "{words:?}: {message}");
+        assert_eq!(output.status.code(), Some(2), "{words:?}");
+    }
+    assert_eq!(fs::read(folder.path().join("there/row.csv")).unwrap(), row);
+}
