@@ -381,7 +381,7 @@ impl Guide {
                 Ok(allowed_mm_s) if allowed_mm_s < after.get(Setting::TopSpeedMmS) => {
                     wanted.extend(self.values(&[Setting::TopSpeedMmS], &[(Setting::TopSpeedMmS, allowed_mm_s)])?);
                 }
-                Err(_) if are_measured => return pushed.map(|()| wanted),
+                _ if are_measured => return pushed.map(|()| wanted),
                 _ => {}
             }
         }
