@@ -186,7 +186,7 @@ impl Ground {
         self.keep_out.mark_dropped(has_left);
     }
 
-    /// As [`forget`](Self::forget), without an alarm that tells. The operator does not know, so nobody can vouch for that ground.
+    /// As [`forget`](Self::forget), without an alarm. The operator has not noticed it, and cannot vouch for that ground.
     pub fn doubt(&mut self) {
         self.forget();
         self.keep_out.mark_dropped(true);

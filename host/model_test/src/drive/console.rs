@@ -148,8 +148,9 @@ impl<M: Machine> Drive<M> {
         if works && keeps && unseen_mm > 0 {
             let tool = here - machine.ticks(Setting::BeamToToolMm);
             let unseen = f64::from(unseen_mm + 1) * f64::from(machine.settings().wheel().ticks(1000).0) / 1000.0;
-            // That distance includes the margin ahead of the ground.
-            expectations.model.trust(tool - 2 * margin - late, tool + unseen as i64 - margin);
+            // That distance includes half of the stem zone and the margin, which lie ahead of the ground that was forgotten.
+            let ahead = machine.ticks(Setting::StemZoneMm) / 2 + margin;
+            expectations.model.trust(tool - 2 * margin - late, tool + unseen as i64 - ahead);
         }
     }
 
