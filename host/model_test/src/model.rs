@@ -139,9 +139,11 @@ impl Model {
         self.frontier - place
     }
 
-    /// Doubts the machine's memory, if a distance that decides about it is within a tolerance.
-    pub fn doubt(&mut self, distance: i64, tolerance: i64) {
-        self.may_have_forgotten |= distance.abs() <= self.slack + tolerance;
+    /// Doubts the machine's memory, if a distance that decides about it is within a tolerance. Returns whether it is.
+    pub fn doubt(&mut self, distance: i64, tolerance: i64) -> bool {
+        let is_close = distance.abs() <= self.slack + tolerance;
+        self.may_have_forgotten |= is_close;
+        is_close
     }
 
     /// The ground ahead of a position is seen again as new.

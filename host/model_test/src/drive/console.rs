@@ -142,10 +142,8 @@ impl<M: Machine> Drive<M> {
         let beyond = expectations.model.rolled_back(here) - margin;
         let keeps = is_now && beyond <= 0;
         expectations.follow_work(works, keeps, here);
-        if is_now {
-            expectations.model.doubt(beyond, late + expectations.blur());
-        }
-        if works && keeps && unseen_mm > 0 {
+        let may_keep = is_now && expectations.model.doubt(beyond, late + expectations.blur());
+        if works && (keeps || may_keep) && unseen_mm > 0 {
             let tool = here - machine.ticks(Setting::BeamToToolMm);
             let unseen = f64::from(unseen_mm + 1) * f64::from(machine.settings().wheel().ticks(1000).0) / 1000.0;
             // That distance includes half of the stem zone and the margin, which lie ahead of the ground that was forgotten.
