@@ -334,7 +334,7 @@ mod tests {
     }
 
     #[test]
-    fn an_edge_lies_where_the_ground_was_when_the_beam_s_sensor_began_to_answer() {
+    fn an_edge_position_allows_for_the_beam_response_time() {
         let (mut ground, mut settings) = ground();
         settings.set(Setting::BeamResponseMs, 10).expect("within its range");
         ground.outdate_leads();
@@ -431,7 +431,7 @@ mod tests {
     }
 
     #[test]
-    fn a_plant_stays_expected_after_another_margin_and_not_after_another_spacing() {
+    fn only_a_changed_spacing_cancels_the_expected_plant() {
         for (setting, value, is_due) in [(Setting::MarginMm, 60, true), (Setting::GuardSpacingMm, 510, false)] {
             let (mut ground, mut settings) = ground();
             settings.set(Setting::GuardSpacingMm, 500).expect("within its range");

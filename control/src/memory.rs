@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn an_update_writes_each_wrong_byte_once_and_does_not_wait_for_a_worn_cell() {
+    fn an_update_writes_each_wrong_byte_once_despite_a_worn_cell() {
         let bytes = [1, 2, ERASED, 4];
         for cell in 9..=14 {
             let mut worn = Worn { memory: Volatile::new(), cell, written: 0, busy: Cell::new(0) };

@@ -114,7 +114,7 @@ fn settings_that_move_the_tool_are_refused_at_work() {
 }
 
 #[test]
-fn an_alarm_is_named_and_keeps_the_machine_from_starting_until_it_is_cleared() {
+fn an_alarm_prevents_a_start_until_it_is_cleared() {
     let mut machine = machine();
     machine.ask("start");
     machine.lose_edges(Beams::default());
@@ -159,7 +159,7 @@ fn after_a_reset_at_work(cause: Cause) -> (String, Rig<ByWidth>) {
 }
 
 #[test]
-fn a_reset_at_work_is_told_in_greeting_and_status_until_the_operator_starts_or_holds() {
+fn a_reset_at_work_is_reported_until_a_start_or_hold() {
     for cause in [Cause::ResetPin, Cause::BrownOut, Cause::LoopStalled, Cause::Unknown] {
         for line in ["start", "hold"] {
             let (greeting, mut machine) = after_a_reset_at_work(cause);
@@ -287,7 +287,7 @@ fn settings_are_saved_in_hold_only() {
 }
 
 #[test]
-fn a_machine_without_saved_settings_says_so_and_does_not_start_until_that_is_cleared() {
+fn a_machine_without_saved_settings_starts_only_after_clear() {
     let mut machine = Rig::wake(ByWidth::new(LEAST_HOLD_MM, 0), Volatile::new(), Cause::BrownOut);
     assert_eq!(machine.state(), State::Alarm(Alarm::SettingsLost));
     assert_eq!(machine.ask("start"), ["error: an alarm is latched, see status, then clear it"]);
@@ -305,7 +305,7 @@ fn lines_with_an_error_are_counted() {
 }
 
 #[test]
-fn the_table_of_faults_names_every_alarm_with_its_code_and_every_warning_and_cause() {
+fn the_table_of_faults_names_every_alarm_warning_and_cause() {
     let table = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/faults.md")).unwrap();
     let name = |text: control::say::Text| String::from_utf8(text.bytes().collect()).unwrap();
     for alarm in (0..).map_while(Alarm::from_index) {

@@ -42,7 +42,7 @@ fn rolling(turns: u16, seen_mm: &[(f64, f64)], unseen: usize, settings: &[(Setti
 }
 
 #[test]
-fn an_unclassified_detection_is_closed_from_its_beginning_and_a_weed_is_open_afterwards() {
+fn a_weed_keeps_the_tool_out_until_it_is_classified() {
     let weed_mm = (600.0, 620.0);
     let mut late = rolling(2000, &[weed_mm], usize::MAX, &[]);
     // So near that the servo needs its command.
@@ -89,7 +89,7 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn a_late_classifier_is_out_as_often_as_a_quick_one_and_knows_the_same_in_the_end(
+    fn a_late_classifier_is_as_safe_and_gives_the_same_classes(
         turns in 1_u16..8,
         things in prop::collection::vec((3.0..400.0, prop_oneof![5.0..40.0, 70.0..200.0]), 1..12),
         legs in prop::collection::vec((50.0..1500.0, prop_oneof![4 => 20.0..900.0, 1 => -200.0..-10.0]), 1..12),

@@ -427,7 +427,7 @@ fn spikes_on_both_channels_are_not_counted() {
 }
 
 #[test]
-fn dropouts_of_a_channel_cost_at_most_one_plant_with_the_coarsest_encoder_from_half_a_kilometre_an_hour() {
+fn dropouts_of_a_channel_cost_at_most_one_plant() {
     let tick_mm = 1000.0 / f64::from(TICKS_PER_M_LEAST);
     let runs: Vec<Run> = [tick_mm, 1.0, TICK_MM]
         .into_iter()

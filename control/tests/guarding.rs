@@ -109,7 +109,7 @@ fn nothing_is_guarded_before_a_plant_is_seen_or_without_a_spacing() {
 }
 
 #[test]
-fn a_plant_early_or_late_by_the_scatter_is_not_missed_and_the_next_is_counted_from_it() {
+fn a_plant_within_the_scatter_sets_the_next_expected_position() {
     for off_mm in [-90.0, -30.0, 30.0, 90.0] {
         let middles_mm = [500.0, 1000.0, 1500.0 + off_mm];
         let mut rolling = guarding(middles_mm.map(canopy).to_vec(), &[]);
@@ -119,7 +119,7 @@ fn a_plant_early_or_late_by_the_scatter_is_not_missed_and_the_next_is_counted_fr
 }
 
 #[test]
-fn a_double_or_a_weed_like_a_plant_between_two_expected_plants_changes_nothing() {
+fn a_double_or_a_weed_does_not_move_the_expected_plants() {
     let between_mm = [(620.0, 700.0), (1700.0, 1790.0)];
     let mut seen_mm = [500.0, 1000.0, 1500.0].map(canopy).to_vec();
     seen_mm.extend(between_mm);

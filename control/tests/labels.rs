@@ -58,7 +58,7 @@ impl Rolling {
 }
 
 #[test]
-fn a_label_that_the_built_in_examples_contradict_is_refused_and_can_be_forced() {
+fn a_label_against_the_built_in_examples_needs_force() {
     for (width_mm, class, wrong, right) in [(150, Class::Plant, "weed", "plant"), (16, Class::Weed, "plant", "weed")] {
         let mut rolling = Rolling::new();
         assert_eq!(rolling.past(540, width_mm), class);
@@ -152,7 +152,7 @@ fn an_example_entered_by_its_features_equals_a_labelled_one() {
 }
 
 #[test]
-fn an_example_with_too_few_or_too_many_features_is_refused_and_the_next_one_starts_empty() {
+fn an_example_with_a_wrong_number_of_features_is_refused() {
     for features in (0..20).filter(|&features| features != 5).chain([255, 256, 261, 600]) {
         let mut rolling = Rolling::new();
         for feature in 0..features {

@@ -162,7 +162,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn the_tool_is_never_in_the_row_over_a_plant_and_every_plant_is_reported_once(
+    fn the_tool_is_never_in_the_row_over_a_plant(
         distance_mm in 150_u16..=2000,
         plants in plants(),
         legs in legs(),
@@ -176,7 +176,7 @@ proptest! {
     }
 
     #[test]
-    fn a_machine_that_starts_suddenly_brings_the_tool_back_no_earlier_than_its_real_speed_allows(
+    fn a_sudden_start_does_not_bring_the_tool_back_too_early(
         stands_at in -45_f64..190.0,
         mm_s in 100_f64..800.0,
         mm_s2 in prop_oneof![300_f64..3000.0, Just(1e9)],
@@ -266,7 +266,7 @@ fn start_now_after_rolling_back_too_far_at_work_waits() {
 }
 
 #[test]
-fn start_now_keeps_the_known_ground_after_a_jolt_back_but_not_after_rolling_back() {
+fn start_now_drops_known_ground_after_rolling_back_too_far() {
     // Up to the margin, and beyond; also where the memory ends, and the beam sees the ground again.
     for (back_mm, keeps) in [(0.0, true), (40.0, true), (70.0, false), (3000.0, false), (8010.0, false)] {
         let mut rolling = Rolling::along(Vec::new(), Vec::new(), &[]);

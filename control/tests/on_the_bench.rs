@@ -18,7 +18,7 @@ use control::{
 use rig::Beams;
 
 #[test]
-fn the_servo_is_driven_directly_in_hold_only_and_the_tool_is_out_again_at_work() {
+fn the_servo_is_driven_directly_only_in_hold() {
     let mut machine = machine();
     machine.servo_in().unwrap();
     assert_eq!(machine.stand(10).pulse, servo::from_us(1500));
@@ -40,7 +40,7 @@ fn the_servo_is_driven_directly_in_hold_only_and_the_tool_is_out_again_at_work()
 }
 
 #[test]
-fn lamp_and_status_tell_a_tool_that_is_out_from_one_that_is_driven_directly() {
+fn lamp_and_status_show_a_tool_that_is_driven_directly() {
     let mut machine = machine();
     let lit_ms = |machine: &mut Machine| {
         let lit = (0..2000).filter(|_| {
@@ -265,7 +265,7 @@ fn a_dry_run_does_not_change_the_known_ground() {
 }
 
 #[test]
-fn any_command_in_the_last_turn_of_a_dry_run_leaves_the_next_real_plant_its_zone() {
+fn a_command_at_the_end_of_a_dry_run_costs_no_plant_its_zone() {
     type Command = fn(&mut Machine) -> Result<(), CommandError>;
     let commands: [Command; 7] = [
         |_| Ok(()),

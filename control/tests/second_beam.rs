@@ -103,7 +103,7 @@ fn a_torn_wire_of_the_second_beam_is_an_alarm_within_three_plants() {
 }
 
 #[test]
-fn a_torn_wire_of_the_first_beam_is_an_alarm_within_three_plants_and_costs_no_plant() {
+fn a_torn_first_beam_wire_is_an_alarm_within_three_plants() {
     let plants = plants(12);
     let mut rolling = with_beams(plants[..5].to_vec(), plants.clone());
     rolling.roll_to(6000.0, 500.0);
@@ -142,7 +142,7 @@ fn an_alarm_resets_the_slip_and_two_plants_give_it_again() {
 }
 
 #[test]
-fn a_slip_that_an_alarm_made_unknown_costs_no_canopy_before_it_is_known_again() {
+fn an_unknown_slip_after_an_alarm_costs_no_canopy() {
     for percent in [-12.0, 10.0, 15.0] {
         for alarm_mm in (2400..2900).step_by(50) {
             let plants = plants(12);
@@ -165,7 +165,7 @@ const FAR: [(Setting, u16); 4] =
     [(Setting::BeamToToolMm, 700), (Setting::SecondBeamMm, 100), (Setting::MarginMm, 50), (Setting::LeadInMs, 0)];
 
 #[test]
-fn a_plant_that_stands_in_the_second_beam_at_power_on_or_after_lost_edges_is_kept() {
+fn a_plant_that_already_stands_in_the_second_beam_is_kept() {
     let plant = (-150.0, 127.0);
     for stands_at_power_on in [true, false] {
         let mut rig = machine();
@@ -225,7 +225,7 @@ fn a_plant_that_only_the_second_beam_sees_is_not_reached_at_any_speed() {
 }
 
 #[test]
-fn a_leaf_that_only_the_second_beam_sees_within_a_wide_plant_does_not_let_the_tool_in() {
+fn a_leaf_seen_only_by_the_second_beam_does_not_let_the_tool_in() {
     // As for a plant with leaves that the first beam does not part.
     let second = vec![(1150.0, 1170.0)];
     let slow = Rig::new(ByWidth::new(0, 14));
@@ -403,7 +403,7 @@ fn plants_of_nine_millimetres_are_compared_with_every_encoder() {
 }
 
 #[test]
-fn fewer_than_64_ticks_between_the_beams_are_refused_with_any_encoder_that_may_work() {
+fn beams_closer_than_64_ticks_are_refused() {
     let mut machine = machine();
     machine.set(Setting::TicksPerM, TICKS_PER_M_LEAST).unwrap();
     assert_eq!(machine.set(Setting::SecondBeamMm, 71), Err(CommandError::SecondBeamAstray));

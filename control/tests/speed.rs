@@ -241,7 +241,7 @@ fn a_silent_wheel_is_slower_than_a_tick_in_its_silence_in_both_directions() {
 }
 
 #[test]
-fn the_speed_of_a_silent_wheel_is_updated_at_each_eighth_of_the_silence_and_not_every_turn() {
+fn the_speed_updates_at_each_eighth_of_the_silence() {
     let mut run = Run::new();
     run.roll(500, 200, |time| 1000.0 * time);
     let (mut known, mut told) = (run.speed(), 0);

@@ -53,7 +53,7 @@ impl Rolling {
 }
 
 #[test]
-fn the_tool_works_under_the_leaves_of_a_single_plant_by_at_most_a_part_of_the_zone() {
+fn the_tool_works_under_leaves_by_at_most_a_part_of_the_zone() {
     for width_mm in [62.0, 70.0, 96.0, 110.0, 132.0, 150.0, 190.0, 300.0] {
         let mut rolling = along(vec![(600.0 - width_mm / 2.0, 600.0 + width_mm / 2.0)]);
         rolling.roll_to(1400.0, 300.0);

@@ -102,7 +102,7 @@ fn more_plants_than_the_schedule_holds_are_an_alarm() {
 }
 
 #[test]
-fn a_crop_of_stalks_that_the_built_in_examples_do_not_know_is_an_alarm_before_the_sixth() {
+fn a_crop_of_unknown_stalks_is_an_alarm_before_the_sixth() {
     let widths_mm = [20.0, 15.0, 25.0, 18.0, 22.0, 16.0, 24.0];
     for (spacing_mm, before_mm, speed_km_h) in
         [(500.0, 300.0, 1.0), (600.0, 900.0, 2.0), (250.0, 500.0, 2.5), (550.0, 1400.0, 1.5)]

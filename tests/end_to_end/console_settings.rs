@@ -101,7 +101,7 @@ fn settings_that_contradict_each_other_are_refused() {
 }
 
 #[test]
-fn settings_that_change_where_the_tool_is_are_refused_while_the_machine_works() {
+fn settings_that_move_the_tool_are_refused_at_work() {
     let mut uno = easily_set();
     ask(&mut uno, "start");
     let mut refused = Vec::new();

@@ -30,7 +30,7 @@ fn assert_no_count_is_lost(counts_per_s: f64, jitter: f64) {
 type Trial = fn(&Path, Turning, f64) -> anyhow::Result<RateResult>;
 
 #[test]
-fn no_count_is_lost_at_the_full_rate_beside_telemetry_and_a_flickering_beam() {
+fn no_count_is_lost_at_the_full_rate_with_a_flickering_beam() {
     assert_no_count_is_lost(EVEN_PER_S, 0.0);
 }
 

@@ -106,7 +106,7 @@ fn a_label_that_the_built_in_examples_contradict_wants_force() {
 }
 
 #[test]
-fn taught_examples_survive_a_power_loss_and_a_corrupted_one_is_dropped_and_counted() {
+fn taught_examples_survive_a_power_loss_unless_corrupted() {
     let mut uno = started();
     roll_past_odd_objects(&mut uno, 1);
     ask(&mut uno, "label plant");

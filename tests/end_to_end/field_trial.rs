@@ -9,7 +9,7 @@ use uno_run::firmware;
 const SHORT_OF_BOUND: f64 = 0.05;
 
 #[test]
-fn the_firmware_damages_no_plant_at_any_of_the_papers_speeds_and_spacings_and_weeds_up_to_the_bound() {
+fn the_firmware_damages_no_plant_and_weeds_nearly_to_the_bound() {
     let mut conditions = Conditions::default();
     conditions.set("plot.rows", 1.0).unwrap();
     conditions.set("plot.row_m", 7.0).unwrap();

@@ -53,7 +53,7 @@ fn the_switch_puts_the_tool_out_at_once() {
 }
 
 #[test]
-fn the_row_is_watched_in_hold_so_that_start_now_goes_on_where_the_machine_is() {
+fn start_now_uses_the_ground_that_the_beam_saw_in_hold() {
     for (line, is_out) in [(&b"start now\n"[..], false), (b"start\n", true)] {
         let mut run = weeding(Start::Now);
         run.uno.send(b"hold\n");

@@ -44,7 +44,7 @@ fn the_firmware_stays_within_its_memory_budget() {
 }
 
 #[test]
-fn the_flash_that_the_tools_tell_is_what_avr_size_counts_and_what_is_flashed() {
+fn the_reported_flash_equals_that_of_avr_size_and_the_image() {
     let output = Command::new("avr-size").arg("-A").arg(elf()).output().expect("./setup.sh brings avr-size");
     let sections = String::from_utf8(output.stdout).expect("it is text");
     let bytes = |name: &str| -> u64 {

@@ -14,7 +14,7 @@ fn pulse_us(uno: &Uno) -> f64 {
 }
 
 #[test]
-fn what_moves_the_tool_in_hold_waits_until_the_machine_stands_and_ends_when_it_rolls() {
+fn the_tool_moves_in_hold_only_while_the_machine_stands() {
     let motion = Motion::steady(0.0, 3000.0, mm_s(2.5), 1000.0).change_speed(0.0, 3000.0);
     let roll = |uno: &mut Uno| {
         let start = uno.cycle();
@@ -101,7 +101,7 @@ fn a_row_without_sensors_swings_the_servo_for_each_plant() {
 }
 
 #[test]
-fn a_command_in_the_turn_in_which_a_played_row_ends_leaves_the_real_plants_alone() {
+fn a_command_as_a_dry_run_ends_costs_no_real_plant() {
     // The row ends after 3.5 m, with half a turn of tolerance.
     let ends_us = 3_500_000_000 / 1300;
     for (command, off_us) in

@@ -22,7 +22,7 @@ fn mean_depth_mm(judgement: &Judgement) -> f64 {
 }
 
 #[test]
-fn without_leads_the_tool_comes_deeper_into_the_canopies_the_faster_the_machine() {
+fn without_leads_a_faster_machine_reaches_deeper_into_canopies() {
     let depths_mm =
         [1.0, 1.5, 2.0, 2.5].map(|speed_km_h| mean_depth_mm(&judgement(ZoneSettings::as_in_the_paper(), speed_km_h)));
     println!("depth into the canopy at 1, 1.5, 2 and 2.5 km/h: {depths_mm:.1?} mm");

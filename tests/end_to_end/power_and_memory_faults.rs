@@ -44,7 +44,7 @@ fn at_work() -> Run {
 }
 
 #[test]
-fn a_reset_at_any_moment_wakes_up_in_hold_with_the_tool_out_and_tells_its_cause() {
+fn a_reset_at_any_moment_ends_in_hold_with_the_tool_out() {
     for (restart, cause) in [
         (Uno::power_cycle as fn(&mut Uno), "power_on"),
         (Uno::reset, "reset_pin"),
@@ -76,7 +76,7 @@ fn a_reset_at_any_moment_wakes_up_in_hold_with_the_tool_out_and_tells_its_cause(
 }
 
 #[test]
-fn a_loop_that_stalls_has_the_tool_put_out_and_the_machine_reset_and_the_cause_told() {
+fn a_stalled_loop_puts_the_tool_out_and_resets_the_machine() {
     for wait_us in [0, 777, 100_013] {
         let mut run = at_work();
         run.uno.run_until(run.uno.cycle() + wait_us * (CYCLES_PER_SECOND / 1_000_000)).expect("the firmware runs");
@@ -178,7 +178,7 @@ fn a_work_switch_whose_line_charges_slowly_clears_no_alarm() {
 }
 
 #[test]
-fn an_erased_eeprom_gives_the_defaults_and_an_alarm_that_is_to_be_cleared_before_work() {
+fn an_erased_eeprom_gives_the_defaults_and_an_alarm() {
     let mut uno = power_up(&elf(), &[]).expect("it wakes up");
     let said = status(&mut uno);
     assert_eq!(["state", "code", "name"].map(|key| value(&said, key)), ["alarm", "5-1", "settings_lost"], "{said}");

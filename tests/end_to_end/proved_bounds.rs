@@ -113,7 +113,7 @@ fn instructions_that_take_a_pair_of_registers_name_it() {
 }
 
 #[test]
-fn a_console_that_is_flooded_beside_a_fast_encoder_and_a_flickering_beam_stays_within_the_bounds() {
+fn a_flooded_console_and_fast_inputs_stay_within_the_bounds() {
     let bounds = proved();
     let mut uno = started();
     uno.measure_interrupts();

@@ -24,19 +24,19 @@ fn go(run: &Run) -> Result<u64, Failure> {
 }
 
 #[test]
-fn in_random_runs_of_the_firmware_the_tool_keeps_off_every_canopy_that_was_seen() {
+fn in_random_runs_the_tool_keeps_off_every_seen_canopy() {
     let extent = Extent { runs: 60, least_turns: 200_000, shrinkings: 300 };
     go_all(extent, &run::wild(14), go);
 }
 
 #[test]
-fn with_a_slipping_wheel_and_beams_that_miss_plants_the_firmware_keeps_off_every_plant() {
+fn with_slip_and_missed_plants_the_tool_keeps_off_every_plant() {
     let extent = Extent { runs: 24, least_turns: 150_000, shrinkings: 300 };
     go_all(extent, &run::beams(10), go);
 }
 
 #[test]
-fn at_a_steady_speed_the_firmware_has_the_tool_leave_the_row_once_for_a_canopy() {
+fn at_a_steady_speed_the_tool_leaves_the_row_once_per_canopy() {
     let extent = Extent { runs: 12, least_turns: 50_000, shrinkings: 300 };
     go_all(extent, &run::calm(4), go);
 }

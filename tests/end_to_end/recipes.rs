@@ -54,7 +54,7 @@ fn copy(from: &Path, to: &Path) {
 }
 
 #[test]
-fn a_setting_a_command_an_alarm_and_an_event_are_added_as_contributing_says() {
+fn the_recipes_of_contributing_build_and_work() {
     let sources = workspace_root();
     let folder = elf().ancestors().nth(3).expect("it is in the target folder").join("recipes");
     let _ = fs::remove_dir_all(&folder);

@@ -22,7 +22,7 @@ fn follow(uno: &mut Uno, duration_ms: u64) {
 }
 
 #[test]
-fn settings_that_were_saved_are_whole_although_the_servos_swings_end_meanwhile() {
+fn settings_saved_while_swings_are_timed_are_complete() {
     let mut meanwhile = 0;
     for save_at_ms in [19_350, 19_400, 19_450, 19_480, 19_500] {
         let mut uno = started();

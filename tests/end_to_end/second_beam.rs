@@ -32,7 +32,7 @@ fn count(judgement: &Judgement, verdict: Verdict) -> usize {
 }
 
 #[test]
-fn a_wheel_that_slips_by_a_tenth_keeps_every_plant_that_comes_behind_the_second() {
+fn with_slip_every_plant_after_the_second_is_kept() {
     for (speed_km_h, slip) in [(1.0, 0.1), (2.5, 0.1), (2.5, -0.1)] {
         let outcome = |second_beam_mm| {
             let mut run = Run::begin(slipping(speed_km_h, second_beam_mm, || slip), &[]);
@@ -76,7 +76,7 @@ fn with_torn_wire(pin: Pin, torn_mm: f64) -> Run {
 }
 
 #[test]
-fn a_torn_wire_of_either_beam_is_an_alarm_within_three_plants_and_costs_none() {
+fn a_torn_wire_of_either_beam_is_an_alarm_and_costs_no_plant() {
     for (pin, alarm) in [(wiring::BEAM, "1-4 beam_blind"), (wiring::SECOND_BEAM, "1-5 second_beam_blind")] {
         // Between the fourth plant and the fifth, for both of the beams.
         let mut run = with_torn_wire(pin, 2400.0);

@@ -79,7 +79,7 @@ fn damaged(run: &Run) -> usize {
 }
 
 #[test]
-fn an_encoder_that_is_silent_for_25_ms_in_every_100_is_an_alarm_before_it_costs_a_plant() {
+fn an_encoder_with_silences_is_an_alarm_and_costs_no_plant() {
     let mut run = losing_edges(plants(), 1.0, 500.0, 3500.0, |time_s| time_s % 0.1 < 0.025);
     assert_alarm(&mut run, "2-1 encoder_silent");
     assert_eq!(damaged(&run), 0);
@@ -120,7 +120,7 @@ fn an_encoder_that_loses_one_edge_in_ten_costs_one_plant_at_most() {
 }
 
 #[test]
-fn spikes_on_both_channels_are_not_counted_and_are_an_alarm_by_the_way_on_which_they_come() {
+fn spikes_on_both_channels_do_not_count_but_raise_an_alarm() {
     // 17 a second, each for 0.1 ms.
     for (speed_km_h, is_alarm) in [(1.0, true), (4.0, false)] {
         let pass = Pass { start: Start::Now, ..pass(plants(), steady(mm_s(speed_km_h), 3500.0)) };
@@ -228,7 +228,7 @@ fn a_beam_that_is_never_broken_is_a_warning_until_a_plant_comes() {
 }
 
 #[test]
-fn a_speed_that_jumps_before_a_window_has_its_late_command_counted_and_told() {
+fn a_speed_jump_before_a_zone_reports_one_late_command() {
     // The tool's zone begins at 1075 - 50 mm. The machine is fast from 60 mm before that on.
     let row = Row::new(vec![Canopy::plant(1150.0, 150.0)]).expect("a plant is a row");
     let jump_mm = 1150.0 - 75.0 - 50.0 + 400.0 - 60.0;
@@ -284,7 +284,7 @@ fn an_end_switch_that_does_not_follow_is_an_alarm() {
 }
 
 #[test]
-fn a_servo_that_dies_in_the_row_is_an_alarm_at_a_speed_at_which_each_swing_is_short() {
+fn a_servo_that_dies_is_an_alarm_even_if_each_swing_is_short() {
     let row = Row::new((0..12).map(|number| Canopy::plant(1200.0 + 500.0 * f64::from(number), 60.0)).collect());
     let pass = pass(row.expect("the plants stand apart"), steady(1250.0, 8000.0));
     let mut run = Run::begin(Pass { start: Start::Now, ..pass }, &["events on"]);
@@ -308,7 +308,7 @@ fn a_servo_that_dies_in_the_row_is_an_alarm_at_a_speed_at_which_each_swing_is_sh
 }
 
 #[test]
-fn a_beam_that_chatters_faster_than_it_can_be_heard_is_known_as_it_is_afterwards() {
+fn after_fast_chatter_the_last_level_of_the_beam_counts() {
     let mut uno = started();
     ask(&mut uno, "plot on");
     // More edges than can wait, 10 us apart, ending with the beam broken or clear.

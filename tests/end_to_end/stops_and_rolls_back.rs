@@ -88,7 +88,7 @@ fn a_stop_with_the_beam_in_a_plant_makes_one_plant_of_it() {
 }
 
 #[test]
-fn rolling_back_over_a_plant_and_forward_again_harms_none_and_counts_none_twice() {
+fn rolling_back_over_a_plant_harms_none_and_counts_none_twice() {
     // The tool goes back over the middle plant, the beam over the last one.
     let motion = Motion::starting_at(0.0)
         .change_speed(mm_s(2.0), 1000.0)
@@ -157,7 +157,7 @@ fn after_a_turn_with_reversing_a_plant_of_the_next_row_is_kept() {
 }
 
 #[test]
-fn after_a_stop_so_hard_that_the_encoder_seems_silent_start_now_takes_no_plant_for_bare_ground() {
+fn start_now_after_a_hard_stop_damages_no_forgotten_plant() {
     // The second plant stands between beam and tool.
     let motion = Motion::starting_at(0.0)
         .change_speed(mm_s(2.5), 1000.0)

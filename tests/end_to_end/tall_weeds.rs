@@ -31,7 +31,7 @@ fn a_tall_weed_does_not_lift_the_tool() {
 }
 
 #[test]
-fn what_is_narrower_than_the_least_width_is_dust_that_is_counted_and_no_object() {
+fn detections_below_the_least_width_count_only_as_dust() {
     let dust = (0..8).map(|number| Canopy::weed(450.0 + 40.0 * f64::from(number), 4.0));
     let row = Row::new(dust.chain([Canopy::plant(300.0, 150.0), Canopy::weed(800.0, 18.0)]).collect());
     let row = row.expect("all of them stand apart");

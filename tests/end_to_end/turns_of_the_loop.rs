@@ -173,7 +173,7 @@ fn no_turn_takes_more_than_a_millisecond_while_a_row_rolls_by() {
 }
 
 #[test]
-fn no_turn_takes_more_than_a_millisecond_where_fifteen_examples_vote_of_as_many_as_can_be_taught() {
+fn no_turn_takes_over_a_millisecond_with_all_examples_taught() {
     // Among the built-in examples, so that they become nearest neighbours.
     let teach = |number| {
         let features = [128, 100 + number, 128, 90 + 2 * number, 128].map(|feature| format!("teach {feature}"));

@@ -22,7 +22,7 @@ fn is_out_at(run: &mut Run, place_mm: f64) -> bool {
 }
 
 #[test]
-fn a_plant_that_is_not_seen_is_kept_where_it_is_due_and_behind_three_the_row_is_at_its_end() {
+fn a_missed_plant_is_kept_and_after_three_the_row_ends() {
     let mut run = past_an_unseen_plant(&["set guard_spacing_mm 500"]);
     let out_mm = [1100.0, 1530.0, 1600.0, 1650.0, 2100.0, 2600.0, 3100.0, 3600.0];
     let in_mm = [1330.0, 1760.0, 2330.0, 2830.0, 4100.0, 4400.0];

@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tool_that_rolls_back_to_forgotten_ground_keeps_its_margin_whatever_the_operator_vouches_for() {
+    fn rolling_back_to_forgotten_ground_keeps_the_margin_closed() {
         let (margin, beam_to_tool) = (95, 764);
         for ahead in [0, 1, 40, 100] {
             let (mut ground, _) = ground();

@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn canopies_are_detections_if_a_gap_parts_them_however_often_the_machine_passes() {
+    fn a_gap_separates_detections_on_any_path_of_the_machine() {
         let ragged = [(100, 200), (215, 300), (339, 400)];
         let there_and_back: Vec<_> = (0..350).chain((50..350).rev()).chain(50..600).collect();
         let past_it: Vec<_> = (0..700).chain((0..700).rev()).chain(0..900).collect();
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn a_plant_that_comes_into_the_beam_behind_the_frontier_begins_at_the_frontier() {
+    fn a_plant_entering_behind_the_frontier_begins_at_the_frontier() {
         let mut detector = begun(0, false);
         assert_eq!(detector.open(), None);
         detector.roll_to(WrappedPosition::new(500), GAP);

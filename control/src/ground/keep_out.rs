@@ -310,7 +310,7 @@ mod tests {
     }
 
     #[test]
-    fn a_canopy_that_is_narrower_than_the_stem_zone_is_closed_in_all_of_the_zone() {
+    fn a_canopy_narrower_than_the_stem_zone_closes_the_whole_zone() {
         for (width, from, to) in [(0, 920, 1080), (60, 950, 1110), (99, 969, 1130), (159, 999, 1160), (160, 1000, 1160)]
         {
             for is_single in [true, false] {

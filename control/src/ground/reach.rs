@@ -237,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn the_open_stretch_lies_between_the_leads_and_is_longer_for_a_tool_that_is_out() {
+    fn the_open_stretch_is_longer_for_a_tool_that_is_out() {
         let forward = Leads { out: Length(103), back: Length(60), response: Length::ZERO };
         assert_eq!(forward.stretch(false), (Length(75), Length(103)));
         assert_eq!(forward.stretch(true), (Length(75 - 16), Length(103 + 43 + 1)));
@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lead_is_the_distance_in_its_time_and_a_millisecond_and_zero_stays_zero() {
+    fn a_lead_is_the_distance_in_its_time_and_a_millisecond() {
         let (speed, expected) = (Speed(1000), Speed(1100));
         // Only the swing out is led at the expected speed.
         for (lead_out_ms, expected_leads) in [(180, [199, 41, 7]), (0, [0, 0, 7])] {

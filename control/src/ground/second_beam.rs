@@ -314,7 +314,7 @@ mod tests {
     }
 
     #[test]
-    fn two_agreeing_plants_give_the_slip_three_give_a_large_one_and_a_half_seen_plant_ends_the_run() {
+    fn slip_needs_two_agreeing_plants_or_three_if_it_is_large() {
         for (travel, excess, plants) in [(400, 0_i32, 2), (444, 28, 2), (540, 89, 3), (330, -45, 3)] {
             let mut second = begun();
             let rows: Vec<_> = (0..plants).map(|number| plant(100 + 2000 * number, travel)).collect();
@@ -383,7 +383,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unexpected_detection_is_open_from_its_edge_and_an_expected_one_beyond_its_known_end() {
+    fn a_detection_is_open_unless_the_first_beam_has_seen_it() {
         let mut second = begun();
         let take = |second: &mut SecondBeam, position, broken| {
             second.take_level(WrappedPosition::new(position), broken, APART, GAP, LEAST);

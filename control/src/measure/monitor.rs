@@ -379,7 +379,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn eight_short_breaks_in_a_row_are_the_beam_s_fault_and_one_of_8_ms_counts_as_four() {
+    fn eight_short_breaks_in_a_row_mean_a_flickering_beam() {
         let explained = |breaks_ms: &[u32]| {
             let (mut monitor, mut ms) = (BeamMonitor::NONE, 1000);
             for length_ms in breaks_ms {
@@ -415,7 +415,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_is_a_quarter_longer_than_steady_progress_and_a_silence_two_and_a_half_times_as_long() {
+    fn gap_and_silence_limits_scale_with_the_steady_progress() {
         for (steady, turn, gap, silence) in [(40, 0, 40 + 10 + 4, 80 + 20 + 8), (59, 9, 59 + 14 + 10, 118 + 29 + 20)] {
             assert_eq!([gap, gap + 1].map(|time| is_gap(time, steady, turn)), [false, true]);
             assert_eq!([silence, silence + 1].map(|time| is_silence(time, steady, turn)), [false, true]);
@@ -442,7 +442,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rolling_wheel_is_quiet_from_10_ms_without_progress_until_the_next_progress() {
+    fn a_rolling_wheel_is_quiet_after_10_ms_without_progress() {
         let mut monitor = standing();
         for ms in 0..100 {
             let position = if ms < 60 { ms.min(40) } else { ms - 20 };

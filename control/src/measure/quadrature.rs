@@ -147,7 +147,7 @@ mod tests {
     const FORWARD: [Channels; 4] = [0b00, 0b10, 0b11, 0b01];
 
     #[test]
-    fn every_pair_of_levels_is_decoded_by_the_sequence_and_a_jump_by_the_last_direction() {
+    fn every_pair_of_levels_decodes_to_the_correct_step() {
         assert_eq!(Quadrature::new(0b00).direction(), 0);
         for from in 0..4 {
             for jump in 0..4 {

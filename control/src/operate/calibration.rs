@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn a_measured_stretch_gives_the_ticks_a_metre_and_an_implausible_one_is_refused_and_can_be_forced() {
+    fn calibration_takes_a_plausible_stretch_or_a_forced_one() {
         let differs = |counted| Err((CommandError::WheelDiffers, counted));
         for (ticks, length_mm, forced, expected) in [
             (18_900, 10_000, false, Ok(1890)),

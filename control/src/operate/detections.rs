@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn the_last_detections_are_kept_in_their_order_and_the_last_one_is_labelled() {
+    fn the_newest_detections_are_kept_in_their_order() {
         let mut detections = Detections::NONE;
         assert!(detections.newest().is_none());
         for seen in 1..=40_i16 {

@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn a_copy_is_mark_number_sequence_values_and_check_with_nothing_in_between() {
+    fn a_copy_is_mark_count_sequence_values_and_checksum() {
         let values = Setting::all().flat_map(|setting| with_k(9).get(setting).to_le_bytes());
         let mut bytes: Vec<u8> = MARK.into_iter().chain([Setting::COUNT, 77]).chain(values).collect();
         bytes.extend(checksum(&bytes).to_le_bytes());
@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn each_changed_bit_of_a_saved_copy_is_told_until_the_next_save_and_an_unfinished_save_is_not() {
+    fn each_changed_bit_is_reported_until_the_next_save() {
         let memory = save(save(Volatile::new(), &with_k(5)), &with_k(7));
         assert!(
             !is_spoiled(&Volatile::new()) && !is_spoiled(&save(Volatile::new(), &with_k(5))) && !is_spoiled(&memory)

@@ -47,7 +47,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_pulse_has_two_steps_a_microsecond_and_a_frame_lasts_twenty_milliseconds() {
+    fn a_pulse_step_is_half_a_microsecond_and_a_frame_is_20_ms() {
         assert_eq!((from_us(1500), from_us(20_000)), (3000, FRAME));
     }
 

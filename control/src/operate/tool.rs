@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn only_swings_out_that_last_count_as_not_followed_and_a_followed_one_ends_the_run() {
+    fn a_run_of_long_swings_not_followed_means_a_stuck_tool() {
         let at = |ms: u32| Instant::at_ms(ms).slow();
         for (lasts_ms, followed_at, stuck) in [(200, None, false), (300, None, true), (300, Some(2), false)] {
             let mut tool = Tool::NONE;

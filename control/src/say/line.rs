@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_is_its_texts_with_its_numbers_for_each_hash_and_its_words_for_each_at() {
+    fn a_line_replaces_each_hash_by_a_number_and_each_at_by_a_word() {
         let mut line = Line::new();
         line.add(Setting::K.text());
         line.say(texts::RANGE);

@@ -29,19 +29,19 @@ mod what_fell;
 use model_test::{Extent, decisions::Decisions, drive::Drive, go_all, run};
 
 #[test]
-fn after_any_event_the_tool_keeps_off_every_seen_canopy_and_the_machine_works_again() {
+fn after_any_event_the_tool_keeps_off_every_seen_canopy() {
     let extent = Extent { runs: 1500, least_turns: 10_000_000, shrinkings: 5000 };
     go_all(extent, &run::wild(30), |run| Drive::go(run, Decisions::boot));
 }
 
 #[test]
-fn with_missed_plants_and_slip_the_tool_keeps_off_every_plant_that_a_beam_has_seen() {
+fn with_slip_the_tool_keeps_off_every_plant_that_a_beam_saw() {
     let extent = Extent { runs: 1500, least_turns: 10_000_000, shrinkings: 3000 };
     go_all(extent, &run::beams(24), |run| Drive::go(run, Decisions::boot));
 }
 
 #[test]
-fn at_a_steady_speed_the_tool_leaves_the_row_once_for_a_canopy_with_any_settings() {
+fn at_a_steady_speed_the_tool_leaves_the_row_once_per_canopy() {
     let extent = Extent { runs: 300, least_turns: 1_000_000, shrinkings: 5000 };
     go_all(extent, &run::calm(8), |run| Drive::go(run, Decisions::boot));
 }

@@ -156,7 +156,7 @@ fn leads_near_each_other_give_one_swing_each_way_a_zone_at_every_speed() {
 }
 
 #[test]
-fn a_tool_driven_directly_is_not_stuck_when_the_machine_takes_it_out_again() {
+fn a_tool_driven_directly_is_not_reported_as_stuck() {
     for moved in ["servo in", "servo 1750", "test row 500", "calibrate servo"] {
         for ms in [1, 50, 150, 400, 1000, 3000] {
             for back in ["servo out", "hold", "start", "start now", "servo in\nservo out"] {
@@ -188,7 +188,7 @@ fn a_dry_run_ends_at_every_accepted_speed() {
 }
 
 #[test]
-fn a_tool_that_rolls_back_to_a_forgotten_canopy_keeps_its_margin_though_the_operator_starts_it_now() {
+fn start_now_keeps_the_margin_of_a_forgotten_canopy() {
     for ahead_mm in (0..120).step_by(5) {
         for speed in [100, 291, 500] {
             let lines = format!(
@@ -202,7 +202,7 @@ fn a_tool_that_rolls_back_to_a_forgotten_canopy_keeps_its_margin_though_the_oper
 }
 
 #[test]
-fn edges_lost_behind_the_frontier_while_the_beam_is_broken_keep_the_tool_out_at_the_frontier() {
+fn edges_lost_behind_the_frontier_keep_the_tool_out_there() {
     // The row goes on behind the first canopy, also to where the machine rolls back.
     let row = [(136, 2), (1, 258)];
     let mut run = run(&row, "clear\nstart\nroll 96 mm at 288 mm/s\nroll back 279 mm at 467 mm/s");

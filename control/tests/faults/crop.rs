@@ -28,7 +28,7 @@ fn as_many_stalks_as_set_are_an_alarm_and_0_turns_it_off() {
 }
 
 #[test]
-fn weeds_with_a_plant_between_them_are_no_alarm_and_neither_are_those_in_hold() {
+fn weeds_in_hold_or_with_plants_between_them_raise_no_alarm() {
     let mut drive = Drive::at_work();
     for _ in 0..10 {
         assert_eq!((drive.pass_stalks(4), drive.alarm()), (4, None));
@@ -42,7 +42,7 @@ fn weeds_with_a_plant_between_them_are_no_alarm_and_neither_are_those_in_hold() 
 }
 
 #[test]
-fn a_detection_below_the_least_width_is_dust_and_neither_a_plant_nor_a_misfit() {
+fn a_detection_below_the_least_width_counts_only_as_dust() {
     let mut drive = Drive::at_work();
     for (setting, value) in [(Setting::MinWidthMm, 25), (Setting::NoPlantM, 2)] {
         drive.machine.set(setting, value).unwrap();

@@ -20,7 +20,7 @@ fn sudden_s(speed_m_s: f64) -> f64 {
 }
 
 #[test]
-fn after_a_sudden_silence_the_tool_is_out_until_ground_seen_since_reaches_it() {
+fn after_a_silence_the_tool_stays_out_until_newly_seen_ground() {
     for speed_m_s in [0.14, 0.3, 0.7, 1.3] {
         let mut drive = Drive::at_work();
         drive.roll(speed_m_s, 0.5);
@@ -43,7 +43,7 @@ fn after_a_sudden_silence_the_tool_is_out_until_ground_seen_since_reaches_it() {
 }
 
 #[test]
-fn a_detection_in_the_beam_at_a_silence_is_a_plant_with_any_width_of_its_rest() {
+fn a_detection_interrupted_by_a_silence_counts_as_a_plant() {
     let mut drive = Drive::at_work();
     drive.beam(true);
     drive.roll(0.7, 0.1);
@@ -169,7 +169,7 @@ fn a_machine_that_brakes_keeps_its_tool_in_the_row() {
 }
 
 #[test]
-fn an_encoder_that_dies_at_rest_has_the_tool_out_at_the_first_plant_and_is_an_alarm_at_the_third() {
+fn an_encoder_that_dies_at_rest_is_an_alarm_at_the_third_plant() {
     let mut drive = Drive::at_work();
     drive.brake(0.5);
     drive.roll(0.0, 0.2);
@@ -185,7 +185,7 @@ fn an_encoder_that_dies_at_rest_has_the_tool_out_at_the_first_plant_and_is_an_al
 }
 
 #[test]
-fn leaves_that_move_while_the_machine_stands_keep_the_tool_out_until_it_rolls_on() {
+fn leaves_moving_at_rest_keep_the_tool_out_until_rolling() {
     let mut drive = Drive::at_work();
     for _ in 0..5 {
         drive.brake(0.5);

@@ -35,7 +35,7 @@ fn working_faster_than_the_limit_is_an_alarm_in_both_directions() {
 }
 
 #[test]
-fn a_jump_in_speed_just_before_a_zone_is_counted_as_late_and_the_tool_leaves_at_once() {
+fn a_jump_in_speed_before_a_zone_counts_as_a_late_command() {
     // The plant's margin is 350 mm behind the beam; the lead is 54 mm at 0.3 m/s, and 234 mm at 1.3 m/s.
     for (jumps, late) in [(false, 0), (true, 1)] {
         let mut drive = Drive::at_work();
@@ -54,7 +54,7 @@ fn a_jump_in_speed_just_before_a_zone_is_counted_as_late_and_the_tool_leaves_at_
 }
 
 #[test]
-fn a_command_is_late_if_the_speed_rises_by_more_than_an_eighth_while_the_tool_swings() {
+fn a_speed_rise_above_an_eighth_during_a_swing_makes_it_late() {
     for (rises_by, late) in [(1.1, 0), (1.2, 1)] {
         let mut drive = Drive::at_work();
         drive.roll(0.5, 0.5);
@@ -101,7 +101,7 @@ fn rolling_back_to_ground_never_seen_takes_the_tool_out_and_is_no_alarm() {
 }
 
 #[test]
-fn rolling_back_over_the_start_line_is_no_alarm_after_a_start_behind_known_ground() {
+fn rolling_back_over_the_start_line_to_known_ground_is_no_alarm() {
     let mut drive = Drive::at_work();
     drive.roll(0.5, 4.0);
     drive.machine.hold();
@@ -156,7 +156,7 @@ fn a_tool_that_follows_within_its_time_is_no_alarm() {
 }
 
 #[test]
-fn a_tool_that_dies_in_the_row_is_an_alarm_at_a_speed_at_which_each_swing_is_short() {
+fn a_tool_that_dies_is_an_alarm_even_if_each_swing_is_short() {
     for (dies_behind, alarm_behind) in [(u32::MAX, None), (5, Some(8))] {
         let mut drive = Drive::at_work();
         drive.machine.set(Setting::EndSwitch, 1).unwrap();

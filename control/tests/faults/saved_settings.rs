@@ -27,7 +27,7 @@ fn saved(settings: &Settings) -> Volatile {
 }
 
 #[test]
-fn a_copy_that_has_changed_since_it_was_saved_is_a_warning_until_the_next_save() {
+fn a_changed_saved_copy_is_a_warning_until_the_next_save() {
     let mut saved = SavedSettings::new(self::saved(&Settings::new()));
     saved.load();
     let mut settings = Settings::new();
@@ -63,7 +63,7 @@ fn a_dry_run_refused_for_contradicting_settings_keeps_the_open_detection() {
 }
 
 #[test]
-fn saved_settings_that_contradict_each_other_are_an_alarm_and_do_not_start() {
+fn contradictory_saved_settings_are_an_alarm_and_do_not_start() {
     let mut settings = Settings::new();
     settings.set(Setting::ServoInUs, 2000).unwrap();
     settings.set(Setting::BeamToToolMm, 200).unwrap();

@@ -214,7 +214,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_habit_of_a_shell_leaves_every_line_its_number_and_a_strange_character_spoils_its_line_only(
+        fn input_in_any_shell_encoding_keeps_its_lines_and_numbers(
             texts in vec(any_text(), 0..6),
             // What shells do with a text: how they encode it, mark it, end its lines, and whether they end the last one.
             encoding in prop::sample::select(vec!["utf-8", "latin-1", "utf-16le", "utf-16be"]),

@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn the_papers_controller_serves_every_plant_and_is_too_late_for_all_of_them_at_speed() {
+    fn the_papers_controller_is_too_late_for_every_plant_at_speed() {
         assert_eq!(reached_by(as_in_the_paper, 0.5), 0);
         assert_eq!(reached_by(as_in_the_paper, 2.5), 8);
     }

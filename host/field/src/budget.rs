@@ -218,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn a_zone_is_the_plant_s_whose_middle_is_nearest_even_where_the_wheel_slips() {
+    fn a_zone_belongs_to_the_canopy_with_the_nearest_middle() {
         let canopies = vec![Canopy::plant(1000.0, 150.0), Canopy::weed(1110.0, 16.0), Canopy::plant(1500.0, 20.0)];
         let mut row = Row::new(canopies).unwrap();
         row.dust_mm = vec![1300.0..1302.0];

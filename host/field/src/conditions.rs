@@ -400,7 +400,7 @@ mod tests {
     }
 
     #[test]
-    fn a_machine_that_strays_into_the_zones_on_either_side_of_its_sweeps_gets_a_warning() {
+    fn straying_that_takes_sweeps_to_the_plants_gets_a_warning() {
         let of = |changes: &[(&str, f64)]| Conditions::with("walked", changes).warning().unwrap_or_default();
         assert_eq!(of(&[]), "");
         let said = of(&[("driving.steering_mm", 16.0)]);

@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wheel_turns_farther_by_its_slip_and_less_far_if_it_is_dragged_and_skids() {
+    fn a_wheel_turns_farther_with_slip_and_less_with_skid() {
         // The mean of some ten legs within 3 % of it.
         let slip_percent = 100.0 * (1.0 - 1.0 / turned_a_mm(&Conditions::default()));
         assert!((slip_percent - 5.0).abs() < 2.0, "{slip_percent} %");

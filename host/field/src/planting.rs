@@ -234,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn a_row_without_an_end_is_sown_in_order_and_without_overlaps_for_all_parameters() {
+    fn an_endless_row_is_sown_in_order_and_without_overlaps() {
         let tight = Planting {
             spacing_mm: 150.0,
             spacing_scatter_mm: 80.0,

@@ -305,7 +305,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_tool_that_is_aside_in_time_damages_nothing_and_leaves_the_weed_beside_the_stem() {
+    fn a_tool_aside_in_time_damages_no_plant_but_leaves_a_weed() {
         let effect = effect_of(800.0, 1100.0);
         assert_eq!((effect.plants, effect.damaged), (1, 0));
         // Nothing reaches the one at 35 mm; the sweeps take the one at 100 mm.
@@ -349,7 +349,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_machine_that_strays_cuts_plants_of_the_rows_on_either_side_with_its_sweeps() {
+    fn a_machine_that_strays_cuts_plants_of_neighbouring_rows() {
         // The zone begins where the sweeps end. The tool is in its own row there.
         let mut stand = stand();
         stand.neighbours[0] = Stem { along_mm: 500.0, across_mm: 250.0, ..stand.neighbours[0] };
@@ -377,7 +377,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn the_ground_from_row_to_row_has_unweeded_strips_only_between_tool_and_sweeps() {
+    fn unweeded_strips_lie_only_between_tool_and_sweeps() {
         for (changes, percent) in [
             // The sweeps take 300 of the 400 mm, and the tool half of its 55 mm.
             (&[][..], 81.875),
@@ -393,7 +393,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_tool_that_does_not_swing_in_time_damages_the_plant_and_takes_the_weed() {
+    fn a_tool_that_swings_late_damages_the_plant_and_takes_a_weed() {
         let effect = effect_of(1200.0, 1500.0);
         assert_eq!((effect.damaged, effect.unseen), (1, 0));
         let mut unseen = stand();
@@ -415,7 +415,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_plant_is_damaged_from_the_place_on_at_which_the_tool_no_longer_gets_past_its_zone() {
+    fn a_swing_too_late_to_clear_the_zone_damages_the_plant() {
         // The tool's edge leaves the zone's 40 mm at 11.1 degrees: 62 + 30 ms after the command, and 92 mm farther.
         // There the zone is a point. A little later the zone is wider than the tool is aside.
         let last_good = (0..200).map(f64::from).take_while(|&mm| effect_of(800.0 + mm, 1400.0).damaged == 0).count();

@@ -76,12 +76,12 @@ fn assert_rare(preset: &str, rows_an_alarm: u64) {
 }
 
 #[test]
-fn weeds_in_a_gap_of_a_weedy_row_are_taken_for_a_crop_in_a_row_of_a_thousand_at_the_most() {
+fn weeds_in_a_gap_rarely_count_as_a_crop_in_a_weedy_row() {
     assert_rare("weedy", 1000);
 }
 
 #[test]
-fn weeds_in_a_gap_are_taken_for_a_crop_in_a_row_of_ten_thousand_at_the_most_where_the_machine_is_set_up() {
+fn weeds_in_a_gap_rarely_count_as_a_crop_after_set_up() {
     assert_rare("straight", 10_000);
 }
 

@@ -63,7 +63,7 @@ fn effect_of(machine: &Machine, stand: &Stand, out_mm: f64, in_mm: f64) -> Effec
 }
 
 #[test]
-fn a_rectangle_meets_a_circle_with_its_front_and_rear_edge_and_with_their_corners() {
+fn a_rectangle_meets_a_circle_with_edges_and_corners() {
     for length_mm in [0.0, 20.0, 45.0, 90.0] {
         let machine = machine(length_mm);
         // On the row's line an edge meets the zone. At 60 mm on the other side than the tool swings, the corner does, at

@@ -94,7 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn deep_nesting_is_refused_with_its_line_and_brackets_in_texts_do_not_count() {
+    fn deep_nesting_is_refused_and_brackets_in_texts_do_not_count() {
         let check = |text: &str| check_nesting(Path::new("my.toml"), text).map_err(|error| error.to_string());
         let deep = [
             "a = ".to_owned() + &"{ a = ".repeat(400),

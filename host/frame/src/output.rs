@@ -147,7 +147,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn messages_to_a_stopped_output_wait_for_none_and_those_without_room_are_counted() {
+    fn messages_never_wait_for_an_output_and_drops_are_counted() {
         const SENT: usize = 100;
         let (stopped, until) = mpsc::channel::<()>();
         let (taken, is_taken) = mpsc::channel();

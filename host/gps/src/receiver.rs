@@ -426,7 +426,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fix_keeps_its_time_though_its_line_comes_late_or_the_computer_s_clock_runs_away() {
+    fn a_fix_keeps_its_time_despite_late_lines_and_clock_drift() {
         // The second clock is 100 in a million too fast: 0.7 s in two hours.
         let cases = [(20, 1.0, [0.0, 300.0, 35.0, 1900.0], 1e-6), (7200, 1.0001, [0.0; 4], 12.1)];
         for (seconds, pace, late_ms, within_ms) in cases {

@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn a_receiver_that_sends_again_is_found_and_its_first_bytes_are_not_useless() {
+    fn a_returned_receiver_is_found_without_losing_its_first_bytes() {
         let mut recorder = connected();
         recorder.take(100, format!("{GGA}\r\n").as_bytes());
         assert_eq!(recorder.take(6000, b"")[0].0, Kind::GpsLost);

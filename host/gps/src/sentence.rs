@@ -303,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn sentences_that_cannot_be_read_are_passed_over_and_other_lines_are_damaged() {
+    fn only_lines_without_a_valid_frame_count_as_damaged() {
         for text in [
             "GPGSV,1,1,00",
             "PUBX,00,1",

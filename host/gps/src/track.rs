@@ -369,7 +369,7 @@ mod tests {
         }
 
         #[test]
-        fn events_in_an_outage_are_between_the_fixes_on_both_sides_if_the_distance_allows(
+        fn events_in_a_short_outage_lie_between_the_fixes_around_it(
             lost in 2..50_u32, length in 1..40_u32, distance_m in 0.0..29.0_f64,
         ) {
             let fixes = driven(every_half_metre(60), eastward);
@@ -456,7 +456,7 @@ mod tests {
     }
 
     #[test]
-    fn a_standing_machine_is_at_the_mean_of_its_fixes_and_two_noisy_fixes_give_no_heading() {
+    fn a_standing_machine_is_at_the_mean_of_its_fixes() {
         let mut fixes = driven([0.0, 0.0, 0.0, 0.5], eastward);
         let plane = Plane::around(FIELD);
         for (at, north) in [(0, 0.3), (1, -0.3), (2, 0.6)] {

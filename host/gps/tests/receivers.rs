@@ -330,7 +330,7 @@ fn a_wheel_that_spins_is_marked_and_does_not_count_for_its_ratio() {
 }
 
 #[test]
-fn a_gap_of_the_wheel_s_statuses_is_marked_and_its_positions_are_interpolated() {
+fn positions_in_a_gap_of_the_statuses_are_interpolated() {
     let file = sent(|_, texts| texts.iter().flat_map(|text| (framed(text) + "\r\n").into_bytes()).collect());
     let job = Job::read(&recorded(&file, steady, 4.05..8.05), &Wanted::default());
     let gaps: Vec<_> = job.events().filter(|event| event.kind == gps::job::EventKind::WheelGap).collect();

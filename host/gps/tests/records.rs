@@ -122,7 +122,7 @@ fn a_summary_counts_the_stand_and_the_ground() {
 }
 
 #[test]
-fn the_map_is_one_collection_with_a_geometry_or_the_reason_why_there_is_none() {
+fn each_map_feature_has_a_geometry_or_a_reason_for_none() {
     // No fix from 20 to 30 s, which is 5 m, and none at the end.
     let lost = |second: u64, line: String| {
         if (20..30).contains(&second) || second > 45 { vec![] } else { vec![(Kind::Gps, line)] }
@@ -173,7 +173,7 @@ fn the_drawing_has_a_circle_for_each_plant_and_none_without_a_place() {
 }
 
 #[test]
-fn a_log_that_was_opened_again_and_an_uno_that_was_reset_restart_the_distance() {
+fn a_reopened_log_or_a_reset_uno_restarts_the_distance() {
     let job = Job::read(&[whole(), whole()].concat(), &Wanted::default());
     assert_eq!(job.events().filter(|event| event.found.is_ok()).count(), 2 * (PLANTS + SWINGS));
     assert_eq!(job.stretches.len(), 2);
@@ -248,7 +248,7 @@ fn a_change_of_the_wheel_begins_a_new_stretch() {
 }
 
 #[test]
-fn another_wheel_has_no_calibration_yet_and_revert_brings_the_old_one_back() {
+fn a_change_of_wheel_and_its_revert_each_begin_a_stretch() {
     let mut log = whole();
     let set = vec![
         (Kind::Command, "set wheel_mm 410"),
@@ -280,7 +280,7 @@ fn weeded_m(passes: &[(&str, &str, &[i64])]) -> f64 {
 }
 
 #[test]
-fn ground_that_is_rolled_over_again_counts_once_and_another_row_for_itself() {
+fn ground_covered_again_counts_once_unless_in_another_row() {
     let row: &[i64] = &[0, 1000, 2000, 3000];
     for (passes, expected_m) in [
         (&[("work", "in", &[0, 500, 1000, 500, 200, 700, 1200][..])][..], 1.2),

@@ -403,7 +403,7 @@ pub(super) mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn a_pipe_or_a_link_in_the_lock_s_place_stops_no_program_and_changes_no_file() {
+    fn a_pipe_or_link_in_place_of_the_lock_is_refused() {
         use std::os::unix::fs::PermissionsExt;
         let folder = tempfile::tempdir().unwrap();
         let [port, private] = ["port", "private"].map(|name| folder.path().join(name));

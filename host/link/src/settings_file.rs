@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn a_new_file_holds_every_setting_with_its_help_and_range_and_is_read_back() {
+    fn a_new_file_has_every_setting_with_its_help_and_range() {
         let settings = rig::settings(&[(Setting::WheelMm, 405), (Setting::EndSwitch, 1)]);
         let text = updated(Path::new("machine.toml"), HEAD, &shown(settings.clone())).unwrap();
         assert!(text.starts_with(HEAD), "{text}");

@@ -215,7 +215,7 @@ fn a_machine_that_has_more_examples_than_this_program_allows_has_no_room() {
 }
 
 #[test]
-fn a_merge_gap_in_ticks_is_pushed_to_machines_of_its_version_and_of_this_one() {
+fn a_merge_gap_in_ticks_is_pushed_to_old_and_new_machines() {
     let file = tempfile::NamedTempFile::new().unwrap();
     for (is_old, ticks, changed) in
         [(true, 40, None), (true, 41, Some("merge_gap_ticks")), (false, 40, None), (false, 60, Some("merge_gap_mm"))]
@@ -253,7 +253,7 @@ fn settings_are_asked_for_again_after_a_damaged_line() {
 }
 
 #[test]
-fn a_value_outside_of_the_machine_s_own_range_is_found_before_anything_is_sent() {
+fn a_value_out_of_range_is_found_before_anything_is_sent() {
     let mut machine = machine();
     let mut link = link(move |line| {
         assert!(!line.starts_with("set "), "`{line}` was typed");

@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_that_are_not_wanted_are_left_out_and_the_others_keep_their_numbers() {
+    fn the_lines_left_after_filtering_keep_their_numbers() {
         let mut pieces = Pieces::new(Path::new("log"));
         let is_wanted = |line: &str| !line.contains(",status,");
         let text = format!("{HEADER}\n0,status,a\n1,event,b\n2,status,c\n3,event,d\n");

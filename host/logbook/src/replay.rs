@@ -267,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn work_that_begins_between_two_statuses_begins_where_the_ground_that_is_unseen_says() {
+    fn unseen_ground_gives_the_start_of_work_between_statuses() {
         // Half of a stem zone is unseen too.
         for (zone, half_mm, swing) in [("set stem_zone_mm 0", 0, 1300), ("set stem_zone_mm 110", 55, 1405)] {
             let swing = format!("swing tool=in pos={swing}");
@@ -318,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn after_plants_before_the_log_swings_for_expected_plants_are_not_compared_until_a_start() {
+    fn swings_for_earlier_plants_are_not_compared_until_a_start() {
         for (guard_spacing_mm, starts_at, zones, is_compared) in
             [(0, 30, 0, true), (500, 30, 0, false), (500, 9, 0, true), (500, 9, 1, false)]
         {
@@ -333,7 +333,7 @@ mod tests {
     }
 
     #[test]
-    fn an_expected_plant_that_is_classified_some_ticks_earlier_or_later_is_no_difference() {
+    fn an_expected_plant_classified_a_little_off_is_no_difference() {
         // The tool goes out for the expected plant, or later for the plant itself.
         for (plant, out, back) in [(1177, 1498, 2275), (1187, 1635, 2285)] {
             let rest = "delay=669 hold=467 actuation=1136";
@@ -365,7 +365,7 @@ mod tests {
     }
 
     #[test]
-    fn events_and_settings_that_only_a_newer_version_knows_are_left_out_and_named() {
+    fn unknown_events_and_settings_are_left_out_and_named() {
         let mut entries = log(&[
             (2, Kind::Event, "tilt deg=4 pos=9"),
             (2, Kind::Event, "alarm code=9-1 name=boredom pos=9"),
@@ -384,7 +384,7 @@ mod tests {
     }
 
     #[test]
-    fn a_replay_ends_at_a_command_that_it_cannot_carry_out_and_not_at_one_that_the_machine_refused() {
+    fn a_replay_ends_at_a_command_that_it_cannot_execute() {
         for (line, notes) in
             [("TEST row 500", vec!["line 6: not replayed from `TEST row 500` on"]), ("test \u{1b}[2J", vec![])]
         {

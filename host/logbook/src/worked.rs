@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stretch_between_two_statuses_has_its_distance_by_the_speed_and_a_log_s_next_session_its_number() {
+    fn a_stretch_between_statuses_gets_its_distance_from_the_speed() {
         let rolling = format!("0,status,{}\n", status("hold", 0, 500))
             + "40,event,state is=work\n"
             + &format!("100,status,{}\n", status("work", 50, 500))
@@ -282,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lost_link_ends_a_stretch_and_a_distance_that_is_unknown_stays_unknown() {
+    fn a_lost_link_ends_a_stretch_with_its_known_distance() {
         let at_work = format!("1,status,{}\n2,status,{}\n", status("work", 0, 500), status("work", 700, 500));
         let lost = of(&format!("{HEAD}{at_work}9,lost,the cable\n"));
         assert_eq!((lost.len(), lost[0].distance_mm), (1, Some(700.0)));
@@ -299,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn the_work_in_a_gap_of_the_statuses_is_unknown_even_if_the_clock_stood_or_events_came() {
+    fn the_work_in_a_gap_of_the_statuses_is_unknown() {
         // The machine rolls a metre a second past a plant each half metre. It is at work from 2 s to 12 s, and from 16 s
         // to 26 s.
         for (gap_ms, are_known) in [
@@ -341,7 +341,7 @@ mod tests {
     }
 
     #[test]
-    fn plants_that_a_start_sees_again_count_once_and_those_of_another_row_do_not() {
+    fn plants_seen_again_after_a_start_count_once() {
         // Plants of 150 mm every half metre. The machine is held after 3 m, drawn back from there, and starts again, at
         // 1800 mm with the beam in a plant.
         for (held_mm, back_to_mm, expected) in [(3000, 1500, 21), (3000, 1800, 20), (3000, 500, 22), (4000, 1500, 20)] {

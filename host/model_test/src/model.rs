@@ -446,7 +446,7 @@ mod tests {
     }
 
     #[test]
-    fn a_weed_that_is_classified_when_the_beam_was_broken_again_behind_it_is_right() {
+    fn a_weed_classified_after_a_new_edge_behind_it_is_accepted() {
         let mut model = Model::new(0, false);
         model.follow(0, &Settings::new(), 0);
         // The gap that ends a detection is 41 ticks.

@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn embedding_in_another_page_stays_out_and_a_link_to_the_front_is_followed() {
+    fn embedding_in_another_page_is_refused_but_not_a_link() {
         for (site, comes_in) in [("same-origin", true), ("none", true), ("same-site", false), ("cross-site", false)] {
             for (path, comes_in) in [("/events", comes_in), ("/", true)] {
                 let mut request = request(Method::GET, path, &[ADDRESS], &[]);

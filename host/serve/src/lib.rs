@@ -303,7 +303,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_only_address_in_a_network_is_found_and_several_or_none_are_errors_with_a_remedy() {
+    fn only_a_unique_network_address_is_chosen_automatically() {
         let found = |addresses: &[[u8; 4]]| {
             only_lan(addresses.iter().map(|&address| address.into())).map_err(|error| error.to_string())
         };

@@ -282,7 +282,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_page_gets_everything_when_it_connects_and_then_the_changes_also_if_a_client_turns_the_events_off() {
+    async fn a_page_gets_everything_first_and_then_each_change() {
         let (machine, hub, board) = machine().await;
         let there = || serde_json::from_str::<Value>(&hub.listen().0[0].text).unwrap();
         until(|| there()["status"].is_string()).await;

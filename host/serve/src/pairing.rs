@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn after_five_wrong_codes_none_is_taken_for_a_minute_and_tries_do_not_lengthen_it() {
+    fn after_five_wrong_codes_none_is_accepted_for_a_minute() {
         let (mut pairing, start) = (pairing(), Instant::now());
         for left in (0..5).rev() {
             assert_eq!(pairing.try_code("00000000", start), Try::Wrong { left });

@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn the_connection_that_asked_last_stays_and_the_one_that_asked_first_gives_way() {
+    fn the_connection_with_the_oldest_request_gives_way() {
         let places = Places::default();
         let asking = || entered(&places, Stage::Asking, Client::Here);
         let mut connections: Vec<_> = (0..PLACES).map(|_| asking()).collect();

@@ -85,7 +85,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_point_of_a_swing_that_overlaps_as_much_enters_the_circle_and_some_would_with_a_millimetre_more() {
+    fn a_swing_with_the_largest_overlap_only_touches_the_circle() {
         for (speed_mm_s, travel_ms, zone_mm, aside_mm) in [
             (278.0, 60.0, 110.0, 134.0),
             (1111.0, 70.0, 110.0, 134.0),
@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn the_faster_the_machine_the_shorter_is_the_saved_time_and_a_crawl_saves_no_distance() {
+    fn a_faster_machine_saves_less_time_by_the_overlap() {
         let ms = |speed_mm_s: f64| overlap_ms(speed_mm_s, 60.0, 110.0, 134.0);
         assert!(ms(278.0) > ms(694.0) && ms(694.0) > ms(1300.0) && ms(1300.0) > 10.0);
         assert!(overlap_mm(1.0, 60.0, 110.0, 134.0) < 0.1);

@@ -141,7 +141,7 @@ fn a_servo_that_was_timed_by_eye_scatters_by_the_error_of_the_eye() {
 }
 
 #[test]
-fn of_the_times_seen_by_eye_the_safest_count_and_the_scatter_is_in_the_margin() {
+fn of_times_seen_by_eye_the_safest_count() {
     let seen = [
         BY_EYE,
         "> set lead_out_ms 190",

@@ -418,7 +418,7 @@ mod tests {
     }
 
     #[test]
-    fn a_plant_that_the_first_beam_misses_is_seen_to_be_harmed_where_the_firmware_ignores_the_second() {
+    fn harm_is_found_if_the_firmware_ignores_the_second_beam() {
         let mut field = field();
         while field.tally.violations.is_empty() && field.tally.rows < 20 {
             let (machine, stem_zone_mm) = field.draw_machine();

@@ -334,7 +334,7 @@ fn zones_reached_stand_beside_damage_and_the_page_says_how_they_differ() {
 }
 
 #[test]
-fn small_damage_does_not_read_as_0_and_what_was_not_counted_reads_as_nothing() {
+fn small_damage_does_not_read_as_0_and_no_count_reads_as_a_dash() {
     let mut totals = totals();
     totals[4].plots.effect = Effect { plants: 4800, damaged: 1, ..Effect::default() };
     totals[4].plots.zones = Zones::default();

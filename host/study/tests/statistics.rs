@@ -181,7 +181,7 @@ fn without_replications_the_interaction_is_part_of_the_residual() {
 /// anova(lm(y ~ factor(speed) * factor(spacing)))
 /// ```
 #[test]
-fn a_treatment_without_plots_takes_a_degree_of_freedom_from_the_interaction() {
+fn a_missing_treatment_takes_an_interaction_degree_of_freedom() {
     let treatments = [(1.0, 50.0), (1.0, 60.0), (2.0, 50.0), (2.0, 60.0), (2.5, 50.0)];
     let design = Design::new(treatments.into_iter().flat_map(|treatment| [treatment; 2]));
     let values = [3.0, 4.0, 5.0, 7.0, 6.0, 5.0, 9.0, 8.0, 7.0, 9.0];
@@ -243,7 +243,7 @@ fn too_few_plots_for_the_parameters_are_refused() {
 }
 
 #[test]
-fn plots_with_a_measured_speed_each_are_refused_where_their_analysis_would_take_long() {
+fn an_analysis_of_too_many_measured_speeds_is_refused() {
     let plots: Vec<(f64, f64)> = (0..5000).map(|plot| (1.0 + f64::from(plot) / 2500.0, 50.0)).collect();
     let values: Vec<f64> = (0..5000).map(|plot| f64::from(plot % 7)).collect();
     let (model, variance) = refusals(&plots, &values);

@@ -105,7 +105,7 @@ fn the_order_of_the_rows_changes_no_figure() {
 }
 
 #[test]
-fn speeds_as_measured_have_no_analysis_of_variance_but_an_offer_that_works() {
+fn measured_speeds_get_no_analysis_but_advice_that_works() {
     let plots = plots("speeds-as-measured.csv");
     let analysis = Analysis::of(plots.clone()).unwrap();
     for response in &analysis.responses[1..] {

@@ -46,7 +46,7 @@ fn mixed(share: i16, narrowest_plant_mm: i16, step_mm: i16) -> Vec<Labelled> {
 }
 
 #[test]
-fn each_detection_of_the_simulated_field_is_classified_right_by_all_others() {
+fn the_other_detections_classify_almost_every_one_correctly() {
     let objects = synthetic::objects(&CROPS[0], 1).unwrap();
     let training = train(&objects, None, DEFAULT_MOST_EXAMPLES).unwrap();
     assert_eq!((training.k, training.forgotten()), (K, None));
@@ -75,7 +75,7 @@ fn the_simulated_field_is_the_same_for_a_seed_and_another_for_another() {
 }
 
 #[test]
-fn the_simulated_field_has_every_speed_slip_missing_plants_and_weeds_everywhere() {
+fn the_simulated_field_has_every_speed_slip_and_missing_plant() {
     let objects = synthetic::objects(&CROPS[0], 1).unwrap();
     let is = |kind: Kind, test: &dyn Fn(&Features) -> bool| {
         objects.iter().any(|object| object.kind == kind && test(&object.features))
@@ -223,7 +223,7 @@ fn as_many_examples_are_kept_as_vote() {
 }
 
 #[test]
-fn objects_that_need_more_examples_than_there_is_room_for_are_refused_by_name() {
+fn detections_that_need_too_many_examples_are_refused() {
     let error = train(&synthetic::objects(&CROPS[0], 1).unwrap(), None, 10).unwrap_err().to_string();
     assert!(error.starts_with("too many examples: ") && error.ends_with(", or choose a larger --max"), "{error}");
 }

@@ -77,7 +77,7 @@ fn none_of_many_is_below_three_by_their_number_and_all_of_them_above() {
 /// binom.test(16, 30000)$conf.int[1:2]; q(600, 1e6); q(93748e3, 1e8); binom.test(9999, 10000)$conf.int[1:2]
 /// ```
 #[test]
-fn an_interval_is_rounded_outward_with_its_share_inside_and_no_end_above_0_reads_as_0() {
+fn an_interval_is_rounded_outward_and_contains_its_share() {
     for (count, of, share, interval) in [
         (13_u64, 1318_u64, "1.0", "0.52 to 1.69"),
         (1, 12_735, "0.0079", "0.00019 to 0.044"),

@@ -202,7 +202,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_inside_is_written_whole_again_where_it_was_damaged_and_beside_that_of_another_build() {
+    fn a_damaged_firmware_is_written_again_and_builds_do_not_mix() {
         let cache = tempfile::tempdir().unwrap();
         let build: [(&str, &[u8]); 2] = [("weeder-firmware.elf", b"new"), ("yard/tester/budgets.toml", b"stack = 1")];
         let folder = write(&build, cache.path()).unwrap();
@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn a_firmware_that_cannot_be_written_names_the_variable_for_another_folder() {
+    fn a_firmware_that_cannot_be_written_names_the_cache_variable() {
         let file = tempfile::NamedTempFile::new().unwrap();
         let error = write(&[("weeder-firmware.elf", b"new")], file.path()).unwrap_err().to_string();
         assert!(error.ends_with(&format!(": let {CACHE} name a writable folder")), "{error}");

@@ -163,8 +163,7 @@ fn words_that_are_no_instructions_are_refused() {
 }
 
 #[test]
-fn a_call_by_a_constant_address_is_followed_and_one_by_an_unknown_address_leads_to_what_the_program_takes_the_address_of()
- {
+fn an_indirect_call_reaches_its_constant_or_any_taken_address() {
     let main = |body: &str| {
         format!(
             "start:\n clr r1\n ldi r16, 0x08\n out 0x3e, r16\n ldi r16, 0xff\n out 0x3d, r16\n1: {body}\n rjmp 1b\none:\n push r2\n pop r2\n ret\ntwo:\n push r2\n push r3\n pop r3\n pop r2\n ret"
@@ -261,7 +260,7 @@ fn a_chip_with_more_flash_puts_longer_addresses_onto_the_stack() {
 }
 
 #[test]
-fn a_store_through_a_known_pointer_sets_flags_and_stack_pointer_as_out_does() {
+fn a_store_through_a_known_pointer_acts_like_out() {
     let handler = "handler:\n push r2\n pop r2\n reti";
     // SREG at 0x5F: interrupts are on while a byte is on the stack.
     let on = "ldi r30, 0x5f\n ldi r31, 0\n ldi r24, 0x80\n st Z, r24";
@@ -286,7 +285,7 @@ fn control_characters_of_a_file_are_not_printed_as_such() {
 }
 
 #[test]
-fn a_call_by_a_slot_of_a_virtual_table_is_followed_past_the_slots_that_were_loaded_before_it() {
+fn a_virtual_call_reaches_the_slot_that_its_loads_select() {
     let called = |loads: &str| {
         let bounds = proved(&format!(
             "start:\n clr r1\n ldi r16, 0x08\n out 0x3e, r16\n ldi r16, 0xff\n out 0x3d, r16\n lds r26, obj\n lds r27, obj+1\n ld r18, X+\n ld r19, X\n movw r26, r18\n {loads}\n icall\n1: rjmp 1b\n\

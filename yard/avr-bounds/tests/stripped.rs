@@ -168,7 +168,7 @@ fn code_that_no_symbol_calls_a_function_is_a_target_of_pointers() {
 }
 
 #[test]
-fn a_call_of_address_0_is_followed_until_start_up_has_set_the_stack_pointer() {
+fn a_call_of_address_0_is_followed_only_during_start_up() {
     // Its return address is on the stack while interrupts are still on.
     assert_eq!(stack_of(&["call0.c"], &[]), Ok(34));
     let error = stack_of(&["jmp0.S"], &["-nostartfiles"]).expect_err("it starts again with interrupts on");

@@ -34,7 +34,7 @@ fn a_handler_s_time_is_its_longest_path_with_response_and_return() {
 }
 
 #[test]
-fn a_handler_that_jumps_away_for_ever_counts_for_the_stack_and_not_for_the_time() {
+fn a_handler_that_never_returns_counts_for_the_stack_only() {
     let bounds = proved(
         "start:\n sei\n1: rjmp 1b\nhandler:\n sbrc r2, 0\n jmp stalled\n reti\nstalled:\n push r2\n push r3\n rcall waits\nwaits:\n rjmp waits",
     );
@@ -88,7 +88,7 @@ fn a_path_that_waits_for_the_reset_is_no_critical_section() {
 const INPUT: fn() -> Input = || Input { vectors: [1].into(), port: 0x29, edges_between_looks: 2, clock_hz: 16_000_000 };
 
 #[test]
-fn an_edge_waits_for_the_other_handler_a_critical_section_and_the_path_to_the_read() {
+fn an_edge_waits_for_a_handler_a_critical_section_and_the_read() {
     let program = "start:
             sei
         1:  nop
@@ -189,7 +189,7 @@ fn a_record_that_a_turn_can_go_round_bounds_nothing() {
 }
 
 #[test]
-fn a_bound_of_a_function_holds_for_each_of_its_loops_unless_a_record_is_at_one() {
+fn a_bound_of_a_function_holds_for_each_loop_without_a_record() {
     let cycles = |body: &str, passes: &[u64]| {
         let program = format!("start:\n clr r1\n1: wdr\n rcall waits\n rjmp 1b\nwaits:\n ldi r24, 8\n{body} ret");
         let bound = LoopBound { passes: passes.into(), by_length: false, because: "it counts".into() };
@@ -213,7 +213,7 @@ fn a_bound_of_a_function_holds_for_each_of_its_loops_unless_a_record_is_at_one()
 }
 
 #[test]
-fn a_function_that_goes_over_as_many_bytes_as_its_caller_says_does_so_where_that_is_a_constant() {
+fn a_constant_length_from_the_caller_bounds_the_loop() {
     let cycles_of = |length: &str, function: &str| {
         let program = format!(
             "start:\n clr r1\n sei\n1: wdr\n cli\n {length}\n rcall {function}\n sei\n rjmp 1b\n\
@@ -246,7 +246,7 @@ fn a_bound_for_a_missing_function_is_refused() {
 }
 
 #[test]
-fn a_turn_of_the_loop_that_feeds_the_watchdog_has_a_bound_once_every_loop_in_it_has() {
+fn a_turn_has_a_bound_once_every_loop_in_it_has_one() {
     let program = |record: &str| {
         format!(
             "start:\n sei\n1: wdr\n ldi r24, 8\n rcall waits\n rjmp 1b\nwaits:\n3:\n {record} dec r24\n brne 3b\n ret"
@@ -306,7 +306,7 @@ fn a_budget_for_a_time_that_the_program_does_not_have_is_refused() {
 }
 
 #[test]
-fn a_program_sleeps_with_interrupts_on_and_its_handlers_take_longer_to_answer() {
+fn a_sleep_needs_interrupts_and_delays_the_handlers() {
     let handler = "handler:\n reti";
     let bounds = proved(&format!("start:\n sei\n1: sleep\n rjmp 1b\n{handler}"));
     // Response 4, out of sleep 4 more, jmp 3, reti 4.
@@ -395,7 +395,7 @@ fn proved_with(program: &str, function: &str, passes: &[u64]) -> Bounds {
 }
 
 #[test]
-fn a_loop_keeps_the_bound_of_its_depth_where_only_a_part_of_the_outer_loop_is_timed() {
+fn a_loop_keeps_its_bound_if_only_a_part_around_it_is_timed() {
     let calling = |body: &str| format!("start:\n sei\n1: wdr\n rcall waits\n sei\n rjmp 1b\nwaits:\n{body} ret");
     let inner = "3: nop\n dec r25\n brne 3b\n";
     // The outer loop is cut by `sei`: in 1, a hundred turns of 4, the way out 3, sei 1.
@@ -428,7 +428,7 @@ fn a_record_of_an_inner_loop_does_not_bound_what_is_left_of_the_outer_one() {
 }
 
 #[test]
-fn a_loop_with_the_watchdog_s_feeding_only_in_a_called_function_has_no_known_turn() {
+fn a_loop_fed_only_in_a_called_function_has_no_known_turn() {
     let turn = |main: &str| proved(&format!("start:\n{main}\nfeeds:\n wdr\n ret")).turn.expect("the watchdog is fed");
     // A small loop in front, whose turn is known.
     let real = turn("1: sbis 3, 0\n rjmp 2f\n wdr\n rjmp 1b\n2: rcall works\n rcall feeds\n rjmp 2b\nworks:\n ret");
@@ -465,7 +465,7 @@ fn a_time_that_is_too_long_to_count_is_no_bound() {
 }
 
 #[test]
-fn a_store_to_the_eeprom_s_control_register_halts_the_core_through_a_known_pointer_too() {
+fn an_eeprom_store_through_a_known_pointer_halts_the_core_too() {
     let cycles = |store: &str| {
         let program = format!("start:\n1: wdr\n ldi r24, 1\n ldi r30, 0x3f\n ldi r31, 0\n {store}\n rjmp 1b");
         proved(&program).turn.and_then(|turn| turn.cycles)

@@ -66,7 +66,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_firmware_is_read_from_its_hex_and_not_from_half_of_it_or_another_chips() {
+    fn half_a_hex_file_or_another_chips_is_refused() {
         let read = |text: &str| flash(Path::new("x.hex"), text.as_bytes()).map_err(|error| error.to_string());
         let firmware: Vec<u8> = (0..1000_u16).map(|byte| byte as u8).collect();
         let whole = text(&firmware);

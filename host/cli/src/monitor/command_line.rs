@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn a_row_s_name_before_a_command_takes_none_of_its_room_and_keeps_nothing_from_being_completed() {
+    fn a_row_name_before_a_command_limits_no_length_or_completion() {
         let mut line = CommandLine::default();
         typed(&mut line, "row3: set lead_o\t");
         assert_eq!(line.text, "row3: set lead_out_ms ");
@@ -209,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn pasted_lines_are_entered_one_by_one_and_no_key_with_ctrl_or_alt_is_a_letter() {
+    fn pasted_lines_are_entered_and_control_keys_type_no_letter() {
         let key = |line: &mut CommandLine, letter, modifiers| line.key(KeyEvent::new(KeyCode::Char(letter), modifiers));
         for ends in [&["j"][..], &["enter"], &["enter", "j"], &["m", "j"]] {
             let (mut line, mut entered) = (CommandLine::default(), Vec::new());

@@ -334,7 +334,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_stretch_that_is_counted_backward_has_a_warning_also_where_the_position_wraps() {
+    fn a_stretch_that_counts_backward_gets_a_warning() {
         assert_eq!(backward(100, 19_000), None);
         assert_eq!(backward(i32::MAX, i32::MIN + 19_000), None);
         assert!(backward(100, -19_000).is_some_and(|warning| warning.contains("swap D2 and D3")));

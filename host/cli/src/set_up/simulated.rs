@@ -146,7 +146,7 @@ mod tests {
     use std::path::Path;
 
     #[test]
-    fn with_another_arm_servo_or_stem_zone_the_simulated_machine_damages_hardly_a_plant_either() {
+    fn simulated_damage_stays_low_with_another_arm_servo_or_zone() {
         let zone = |stroke_us: u16, zone_mm, out_ms, in_ms| {
             let pulse = [(Setting::ServoOutUs, 1500 + stroke_us), (Setting::StemZoneMm, zone_mm)];
             [&pulse[..], &[(Setting::LeadOutMs, out_ms), (Setting::LeadInMs, in_ms)]].concat()
@@ -178,7 +178,7 @@ mod tests {
         intra_row.blade_mass = \"0.01 kg\"\n";
 
     #[test]
-    fn a_heavy_arm_and_a_long_blade_are_in_the_expected_damage_and_a_measured_time_replaces_the_calculated_one() {
+    fn expected_damage_allows_for_arm_blade_and_measured_time() {
         let pulse_and_zone = [(Setting::ServoOutUs, 1750), (Setting::StemZoneMm, 110), (Setting::SecondBeamMm, 200)];
         // As timed and measured on the field's own machine, without the blade's part of the margin.
         let leads = [(Setting::LeadOutMs, 116), (Setting::LeadInMs, 78)];

@@ -20,7 +20,7 @@ fn a_speed_that_no_machine_walks_is_refused_with_its_range() {
 }
 
 #[test]
-fn a_machine_that_strays_into_its_sweeps_gets_a_warning_from_each_command_that_weeds() {
+fn each_weeding_command_warns_of_straying_into_the_sweeps() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("field.toml"), "[driving]\nsteering_mm = 15\n[plot]\nrow_m = 2\n").unwrap();
     for command in [
@@ -54,7 +54,7 @@ fn a_field_s_second_beam_that_the_distance_removes_is_named() {
 }
 
 #[test]
-fn a_distance_that_is_not_set_gets_a_warning_and_one_that_is_set_gets_none() {
+fn a_distance_other_than_the_setting_gets_a_warning() {
     let folder = tempfile::tempdir().unwrap();
     let field = "[machine]\nbeam_to_tool_mm = 500\n[settings]\nbeam_to_tool_mm = 600\n";
     fs::write(folder.path().join("field.toml"), field).unwrap();
@@ -88,7 +88,7 @@ fn a_recording_without_its_channels_is_refused() {
 }
 
 #[test]
-fn a_number_below_its_range_is_refused_with_the_range_and_not_as_an_option() {
+fn a_negative_number_is_refused_with_its_range() {
     assert_refused(&["sim", "--speed", "-1"], "it has to be a number from 0.1 to 10");
     assert_refused(&["sim", "--plants", "-1"], "it has to be a whole number from 1 to 1000");
     assert_refused(&["sim", "--seed", "-1"], "it has to be a whole number from 0 to 18446744073709551615");

@@ -100,7 +100,7 @@ fn a_name_that_no_output_can_have_is_refused_before_the_work() {
 }
 
 #[test]
-fn a_folder_called_report_where_the_command_is_typed_keeps_it_from_nothing() {
+fn an_existing_folder_called_report_does_not_stop_a_command() {
     let folder = tempfile::tempdir().unwrap();
     fs::create_dir(folder.path().join("report")).unwrap();
     for (number, (arguments, kind)) in (0..).zip(&WRITERS[..2]) {

@@ -149,7 +149,7 @@ fn an_uno_is_flashed_through_either_bootloader() {
     // Each takes the time that its line takes.
     thread::scope(|scope| {
         scope.spawn(an_empty_uno_is_flashed_through_optiboot_and_answers);
-        scope.spawn(an_uno_with_the_old_bootloader_is_flashed_at_its_own_baud_rate_up_to_the_last_byte);
+        scope.spawn(flashing_with_the_old_bootloader_reaches_the_last_byte);
     });
 }
 
@@ -168,7 +168,7 @@ fn an_empty_uno_is_flashed_through_optiboot_and_answers() {
     assert_eq!(fs::metadata(&eeprom).unwrap().len(), 1024);
 }
 
-fn an_uno_with_the_old_bootloader_is_flashed_at_its_own_baud_rate_up_to_the_last_byte() {
+fn flashing_with_the_old_bootloader_reaches_the_last_byte() {
     let folder = tempfile::tempdir().unwrap();
     let link = folder.path().join("uno");
     let arguments = [Path::new("--stand"), Path::new("--bootloader"), &old_bootloader(), Path::new("--link"), &link];

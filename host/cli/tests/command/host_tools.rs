@@ -36,7 +36,7 @@ fn say_until(receiver: Option<&mut Pty>, log: &Path, kind: &str, count: usize) {
 }
 
 #[test]
-fn a_receiver_that_is_unplugged_and_plugged_in_again_goes_on_in_the_record() {
+fn a_receiver_plugged_in_again_continues_in_the_record() {
     let uno = uno();
     let folder = tempfile::tempdir().expect("there is room for files");
     let [port, log, map] = ["gps", "field.csv", "field.geojson"].map(|name| folder.path().join(name));
@@ -304,7 +304,7 @@ fn the_plain_monitor_answers_line_by_line_and_its_status_shows_errors() {
 }
 
 #[test]
-fn a_line_that_cannot_be_sent_is_refused_by_its_number_and_hold_behind_it_is_sent() {
+fn hold_is_sent_although_a_line_before_it_is_refused() {
     let uno = uno();
     let too_long = format!("frobnicate\n{}\nhold\n", "x".repeat(100));
     let utf16: Vec<u8> = "\u{feff}version\r\nHOLD\r\n".encode_utf16().flat_map(u16::to_le_bytes).collect();

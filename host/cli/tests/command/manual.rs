@@ -173,7 +173,7 @@ fn every_command_in_the_manual_exists_with_its_options() {
 const FIRST_SCREEN: usize = 32;
 
 #[test]
-fn the_readme_s_first_screen_has_both_ways_in_to_be_copied_as_a_whole_and_the_gate_follows_them() {
+fn the_readme_starts_with_both_commands_and_the_gate_runs_them() {
     let readme = fs::read_to_string(Path::new(ROOT).join("README.md")).expect("there is a README");
     let screen: Vec<&str> = readme.lines().take(FIRST_SCREEN).collect();
     for command in ["./setup.sh && cargo sim", "./setup.sh && cargo test"] {

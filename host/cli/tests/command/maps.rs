@@ -19,7 +19,7 @@ fn records_with_the_same_file_name_have_their_paths_on_the_map() {
 }
 
 #[test]
-fn a_receiver_without_a_fix_gets_other_advice_than_a_record_without_a_receiver() {
+fn advice_differs_for_no_fix_and_for_no_receiver() {
     let folder = tempfile::tempdir().unwrap();
     for (lines, advice) in [
         ("0,lost,gone\n", "`weeder record --gps PORT` records a receiver"),

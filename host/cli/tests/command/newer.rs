@@ -103,7 +103,7 @@ fn answer(line: &str, own: [&str; 3]) -> String {
 }
 
 #[test]
-fn hold_status_and_log_work_with_a_newer_firmware_and_the_newer_side_is_named() {
+fn hold_status_and_log_work_with_a_newer_firmware() {
     let machine = Newer::start();
     let folder = tempfile::tempdir().expect("there is room for files");
     let log = folder.path().join("log.csv");

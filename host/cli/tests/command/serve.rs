@@ -128,7 +128,7 @@ fn a_foreign_host_or_origin_is_refused_on_every_path_the_events_included() {
 }
 
 #[test]
-fn a_paired_phone_watches_and_holds_and_nothing_else_unless_the_operator_allowed_it() {
+fn a_paired_phone_only_watches_and_holds_unless_allowed_more() {
     let folder = folder();
     let (_uno, port) = uno(&folder, "uno", &["--stand"]);
     for options in [&[][..], &["--allow-start"]] {
@@ -206,7 +206,7 @@ fn bytes_to_the_end(mut stream: impl Read) -> usize {
 }
 
 #[test]
-fn clients_that_never_read_are_let_go_of_and_hold_up_neither_the_machine_nor_the_others() {
+fn clients_that_never_read_are_disconnected_and_delay_no_other() {
     const LITTLE: usize = 4096;
     let folder = folder();
     let (_uno, port) = uno(&folder, "uno", &["--fast"]);
@@ -250,7 +250,7 @@ fn clients_that_never_read_are_let_go_of_and_hold_up_neither_the_machine_nor_the
 }
 
 #[test]
-fn a_pulled_port_is_reported_and_opened_again_and_the_other_machine_works_on() {
+fn a_pulled_port_is_opened_again_while_the_other_machine_works() {
     let folder = folder();
     let (left, left_port) = uno(&folder, "left", &["--stand"]);
     let (_right, right_port) = uno(&folder, "right", &["--stand"]);

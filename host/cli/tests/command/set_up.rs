@@ -117,7 +117,7 @@ fn after_each_step(seed: u64) -> Followed {
 }
 
 #[test]
-fn after_each_step_in_every_order_and_with_any_left_out_no_plant_is_damaged_and_no_zone_reached() {
+fn set_up_steps_in_any_order_damage_no_plant_and_reach_no_zone() {
     let followed = after_each_step(SEED);
     assert_eq!((followed.damaged, followed.reached), (0, 0), "{followed:?}");
 }
@@ -353,7 +353,7 @@ fn a_person_sets_the_virtual_uno_up_from_the_first_question_to_the_last() {
 }
 
 #[test]
-fn without_a_machine_s_file_its_measures_are_asked_and_nothing_else_is_offered() {
+fn without_a_machine_file_set_up_asks_for_its_measures() {
     let folder = TempDir::new().expect("there is room for a folder");
     let (_uno, _) = uno(folder.path(), &["--stand", "--link", "uno"]);
     // Step 2 with a beam that is too near at first, and with an encoder of 500 lines.
@@ -402,7 +402,7 @@ fn answered(folder: &Path, lines: &[&str]) -> String {
 }
 
 #[test]
-fn of_two_timings_by_eye_the_safest_times_are_set_and_one_that_is_left_out_does_not_count() {
+fn two_timings_by_eye_set_the_safest_times() {
     let folder = TempDir::new().expect("there is room for a folder");
     let (_uno, _) = uno(folder.path(), &["--stand", "--fast", "--link", "uno"]);
     let to_step_6 = ["s", "s", "s", "s", "s", "off", ""];
@@ -416,7 +416,7 @@ fn of_two_timings_by_eye_the_safest_times_are_set_and_one_that_is_left_out_does_
 }
 
 #[test]
-fn a_lead_that_contradicts_the_others_is_asked_again_and_the_timing_counts() {
+fn a_lead_that_contradicts_other_settings_is_asked_again() {
     let folder = TempDir::new().expect("there is room for a folder");
     let (_uno, _) = uno(folder.path(), &["--stand", "--fast", "--link", "uno"]);
     let said = answered(folder.path(), &["", "s", "s", "s", "s", "s", "off", "", "450", "40", "", "550", "q"]);
@@ -426,7 +426,7 @@ fn a_lead_that_contradicts_the_others_is_asked_again_and_the_timing_counts() {
 }
 
 #[test]
-fn a_near_beam_is_offered_with_a_lower_top_speed_and_what_is_open_comes_before_work() {
+fn a_near_beam_is_offered_with_a_lower_top_speed() {
     let folder = TempDir::new().expect("there is room for a folder");
     let (_uno, _) = uno(folder.path(), &["--stand", "--link", "uno"]);
     let said = answered(folder.path(), &["", "s", "", "300", "", "", "", "", "", "s", "s", "s", "s", "s", "s"]);
@@ -453,7 +453,7 @@ fn a_call_without_the_machine_s_file_knows_the_machine_of_the_call_before() {
 }
 
 #[test]
-fn a_line_that_is_typed_at_a_terminal_before_a_question_does_not_answer_it() {
+fn a_line_typed_before_a_question_does_not_answer_it() {
     let folder = TempDir::new().expect("there is room for a folder");
     let (_uno, _) = uno(folder.path(), &["--stand", "--link", "uno"]);
     let mut terminal = Pty::open().expect("there is a pseudo terminal");

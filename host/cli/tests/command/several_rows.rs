@@ -82,7 +82,7 @@ fn rows_are_named_listed_renamed_and_forgotten() {
 }
 
 #[test]
-fn settings_of_several_rows_are_pulled_pushed_and_compared_and_the_row_that_fails_is_named() {
+fn settings_of_several_rows_are_pulled_pushed_and_compared() {
     let folder = TempDir::new().expect("there is room for a folder");
     let machine = rows(&folder, 3);
     let file = named(&folder, 3);

@@ -166,7 +166,7 @@ fn options_that_contradict_parts_are_refused() {
 }
 
 #[test]
-fn a_shard_that_is_killed_leaves_no_file_and_computes_the_same_when_it_is_restarted() {
+fn a_killed_shard_leaves_no_file_and_can_be_restarted() {
     let folder = folder();
     let path = folder.path();
     let endless = ["soak", "--hours", "10000", "--uno-minutes", "0", "--shard", "1/2", "--out", "1.part"];

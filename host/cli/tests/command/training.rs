@@ -95,7 +95,7 @@ fn a_table_larger_than_the_flash_budget_is_refused_by_name() {
 }
 
 #[test]
-fn objects_that_take_more_examples_than_the_flash_has_room_for_are_refused_by_name() {
+fn detections_that_need_too_many_examples_are_refused() {
     // Plants and weeds in a chessboard pattern, 80 of each; four detections a square, so that none is noise.
     let square = |place: i32| {
         let (spacing_mm, hold_mm) = (100 + place / 20 * 50, 100 + place % 20 * 10);
@@ -144,7 +144,7 @@ fn detections_that_dumps_repeat_count_once() {
 }
 
 #[test]
-fn a_table_that_forgets_plants_and_lines_that_were_answered_otherwise_are_told() {
+fn training_reports_newly_unknown_plants_and_changed_answers() {
     // Weeds and plants of nearly the same widths: few plants have room beside the weeds.
     let detection = |n: i32| {
         let (label, narrowest_mm) = if n % 2 == 0 { ("weed", 104) } else { ("plant", 112) };

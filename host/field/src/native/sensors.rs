@@ -161,7 +161,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     #[test]
-    fn counts_that_are_worked_out_together_are_those_of_each_turn_and_each_edge_by_itself() {
+    fn counts_computed_together_equal_those_of_each_turn_and_edge() {
         for seed in 0..8 {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let row =

@@ -115,7 +115,7 @@ fn a_heading_that_may_mean_a_column_that_a_table_may_lack_is_asked_about() {
 }
 
 #[test]
-fn a_comma_or_point_that_may_be_one_of_thousands_is_refused_unless_another_number_shows_what_it_is() {
+fn an_ambiguous_comma_or_point_in_a_number_is_refused() {
     let read = |text: &str| {
         let table = CsvTable::parse(Path::new("table.csv"), text.into(), &["place_mm", "count"]).unwrap();
         let places = table.lines().map(|line| line.value::<f64>("place_mm", "a number"));
@@ -223,7 +223,7 @@ fn every_mixture_of_a_spreadsheet_s_habits_gives_the_same_table() {
 }
 
 #[test]
-fn a_short_line_is_filled_and_a_table_is_empty_only_where_the_caller_allows_it() {
+fn short_lines_and_empty_tables_are_errors_unless_allowed() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("table.csv");
     fs::write(&path, "place_mm,width_mm\n7\n").unwrap();

@@ -29,7 +29,7 @@ fn a_number_that_windows_makes_up_is_no_board_s_own() {
 
 #[cfg(unix)]
 #[test]
-fn boards_without_a_number_of_their_own_are_known_by_the_place_where_they_are_plugged_in() {
+fn boards_without_a_unique_number_are_identified_by_socket() {
     let folder = tempfile::tempdir().unwrap();
     let folder = fs::canonicalize(folder.path()).unwrap();
     let [first, second] = ["ttyUSB0", "ttyUSB1"].map(|name| {
@@ -77,7 +77,7 @@ fn names_are_kept_in_their_order_with_the_user_s_comments() {
 }
 
 #[test]
-fn a_name_that_could_be_no_file_s_or_another_row_s_is_refused_with_what_would_be_right() {
+fn a_row_name_that_is_taken_or_unfit_for_a_file_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let mut names = Names::read(&folder.path().join("rows.toml")).unwrap();
     names.name("Left", number("A1")).unwrap();

@@ -98,7 +98,7 @@ fn a_silent_or_lost_row_delays_no_other_row_s_hold() {
 }
 
 #[test]
-fn a_row_that_was_lost_with_a_hold_unanswered_holds_first_when_it_is_back_and_types_nothing_else() {
+fn a_row_lost_with_a_pending_hold_only_holds_when_it_returns() {
     let board = ScriptedBoard::plugged_in();
     let (rows, _) = open(std::slice::from_ref(&board));
     rows.command(0, "silence");
@@ -119,7 +119,7 @@ fn a_row_that_was_lost_with_a_hold_unanswered_holds_first_when_it_is_back_and_ty
 }
 
 #[test]
-fn a_hold_to_all_has_the_time_of_the_last_row_and_the_rows_that_have_not_obeyed() {
+fn a_hold_to_all_reports_the_slowest_and_the_missing_rows() {
     let names = ["1", "2", "3"].map(str::to_owned);
     let since = Instant::now();
     let answered = |row, ms, refusal| Heard {

@@ -145,7 +145,7 @@ mod tests {
     use std::time::Duration;
 
     #[test]
-    fn a_warning_lasts_while_the_status_names_it_and_one_that_it_does_not_name_until_the_next_hold() {
+    fn a_warning_lasts_until_the_status_or_the_next_hold_ends_it() {
         let (mut session, mut now, mut events) = (Session::default(), Moment::default(), Vec::new());
         session.open(false);
         let mut warnings = |said: &str, named: &str| {

@@ -170,7 +170,7 @@ fn noise_between_the_lines_does_not_end_a_session() {
 }
 
 #[test]
-fn an_uno_that_is_unplugged_or_never_was_there_is_lost_once_and_found_later() {
+fn an_absent_uno_is_reported_lost_once_and_found_later() {
     let unplugged = Talk::connected();
     unplugged.board.plug(false);
     let absent = Talk::waiting(ScriptedBoard::default());
@@ -211,7 +211,7 @@ fn a_hold_that_waits_for_a_board_is_not_ended_at_each_try() {
 }
 
 #[test]
-fn a_computer_that_was_busy_reads_all_that_has_come_before_it_gives_an_answer_up() {
+fn a_busy_computer_reads_everything_before_it_times_out() {
     let mut talk = Talk::connected();
     talk.board.say(&b"swing tool=out pos=9\r\n".repeat(256));
     assert!(talk.command("hold"));
@@ -243,7 +243,7 @@ fn hold_is_typed_at_once_and_waiting_commands_are_dropped() {
 }
 
 #[test]
-fn after_a_reset_everything_is_asked_again_and_commands_from_before_it_are_not_executed() {
+fn commands_from_before_a_reset_are_not_executed() {
     let mut talk = Talk::connected();
     assert!(talk.command("silence"));
     talk.turn();
@@ -291,7 +291,7 @@ fn a_restart_at_work_is_reported_with_its_cause_and_one_in_hold_is_not() {
 }
 
 #[test]
-fn an_answer_to_an_earlier_question_is_taken_for_no_other_and_the_machine_is_asked_again() {
+fn an_answer_to_an_earlier_question_counts_for_no_other() {
     for count in 0..4 {
         let mut talk = Talk::connected();
         talk.board.say(&[RESTARTS, IS_IN_HOLD.repeat(count).as_bytes()].concat());
@@ -352,7 +352,7 @@ fn hold_does_not_wait_for_the_first_answers() {
 }
 
 #[test]
-fn where_an_answer_may_be_late_hold_is_typed_at_once_and_again_behind_the_first_certain_answer() {
+fn a_hold_is_sent_again_after_the_first_certain_answer() {
     let (mut session, mut now) = (Session::default(), Moment::default());
     session.open(false);
     let mut sent = String::new();
@@ -372,7 +372,7 @@ fn where_an_answer_may_be_late_hold_is_typed_at_once_and_again_behind_the_first_
 }
 
 #[test]
-fn a_device_that_never_ends_its_answer_is_given_up_after_each_try_s_longest_time() {
+fn a_device_that_never_ends_its_answer_is_given_up_in_time() {
     let (mut session, mut now) = (Session::default(), Moment::default());
     session.open(false);
     let mut asked = Vec::new();

@@ -17,7 +17,7 @@ fn board([in_us, out_us]: [u16; 2]) -> Settings {
 }
 
 #[test]
-fn a_thick_shank_swings_late_falls_back_without_a_strong_spring_and_stands_over_high_plants() {
+fn a_thick_shank_is_slow_and_falls_back_without_a_spring() {
     // By hand: 1.94 kg of rod and 0.4 kg of blade, 0.1283 kg m2 and 47.97 kg cm, 22.1 of them at 27.5 degrees. The time
     // constant is 142.7 ms, and 71.8 ms at the final speed become 171.6 ms from rest. A numerical integration agrees.
     let mut machine = Machine::default();
@@ -39,7 +39,7 @@ fn a_thick_shank_swings_late_falls_back_without_a_strong_spring_and_stands_over_
 }
 
 #[test]
-fn a_stem_s_zone_needs_a_shorter_stroke_than_its_canopy_and_comes_with_its_settings() {
+fn a_stem_zone_needs_a_shorter_stroke_than_the_canopy() {
     let torque = KG_CM.of(10.0);
     let mut machine = with_tool_of_100_mm();
     let canopy = Swing::of(&machine, torque).expect("it swings");
@@ -92,7 +92,7 @@ fn fixed_frames_and_a_higher_top_speed_of_the_board_need_safer_leads() {
 }
 
 #[test]
-fn the_firmware_takes_each_line_and_a_long_lead_comes_with_the_highest_speed_for_it() {
+fn the_firmware_accepts_each_line_and_the_speed_for_a_long_lead() {
     // The soil's torque on the paper's blade, and on one of 2.5 mm.
     // The trailing arm's margin is 26 mm wider, too wide for the default lead. A new board's tool is out at the last
     // pulse.
@@ -221,7 +221,7 @@ fn plants_off_the_line_meet_the_arm_lower_the_more_room_is_asked_for_them() {
 }
 
 #[test]
-fn the_stroke_clears_the_firmware_s_circle_where_stems_stand_farther_off_than_the_room() {
+fn the_stroke_clears_the_circle_also_for_stems_off_the_line() {
     for (room_mm, stem_off_mm, beside_mm) in [(10.0, 10.0, 55.0), (10.0, 25.0, 58.5), (23.0, 20.0, 68.0)] {
         let mut machine = with_tool_of_100_mm();
         machine.swing.protected = MM.of(90.0);
@@ -235,7 +235,7 @@ fn the_stroke_clears_the_firmware_s_circle_where_stems_stand_farther_off_than_th
 }
 
 #[test]
-fn a_blade_that_is_long_along_the_row_needs_a_wider_margin_than_the_default() {
+fn a_blade_that_is_long_along_the_row_needs_a_wider_margin() {
     let of = |length_mm: f64, arm_trails: u32| {
         let mut machine = Machine::default();
         machine.intra_row.blade_base = MM.of(length_mm);

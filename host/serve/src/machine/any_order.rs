@@ -253,7 +253,7 @@ fn run(seed: u64) -> [usize; 2] {
 }
 
 #[test]
-fn in_any_order_nothing_starts_that_was_given_up_and_a_hold_that_is_pressed_last_holds() {
+fn in_any_order_no_cancelled_start_runs_and_the_last_hold_holds() {
     let first = std::env::var("WEEDER_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(1);
     println!("WEEDER_SEED={first}");
     let runtime = runtime::Builder::new_current_thread().enable_time().build().unwrap();

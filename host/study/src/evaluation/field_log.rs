@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn stretches_are_the_plots_in_the_order_of_their_numbers_and_filled_cells_stay() {
+    fn stretches_follow_plot_numbers_and_keep_filled_cells() {
         // The table was sorted by speed.
         let mut records = [PlotRecord { plants: Some(61), ..plot(2, 1.0) }, plot(1, 1.8)];
         let joined = join(&mut records, &[stretch(0, 60, 30.0), stretch(100, 108, 30.0)], &[]).expect("they match");
@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_of_the_log_is_told_and_leaves_the_time_empty_also_between_two_parts() {
+    fn a_gap_in_the_log_is_reported_and_leaves_the_time_empty() {
         let lost = Worked { gaps: 0..1, distance_mm: None, plants: None, ..stretch(0, 60, 30.0) };
         let behind = Worked { gaps: 1..1, ..stretch(50, 30, 15.0) };
         for (stretches, distance_m, swings) in
@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn a_speed_far_from_the_plan_is_told_and_an_unknown_distance_leaves_the_table_as_it_is() {
+    fn a_speed_far_from_the_plan_is_reported() {
         let mut records = [plot(1, 3.0)];
         let joined = join(&mut records, &[stretch(0, 60, 30.0)], &[]).expect("they match");
         assert!(joined[0].warning().is_some_and(|said| said.contains("the log has 1.80 km/h, and the table 3:")));

@@ -64,7 +64,7 @@ mod tests {
     }
 
     #[test]
-    fn columns_may_come_in_any_order_with_others_comments_and_a_byte_order_mark() {
+    fn columns_may_come_in_any_order_with_others_and_comments() {
         let columns: Vec<&str> = HEADER.trim().split(',').rev().collect();
         let values: Vec<&str> = LINE.trim().split(',').rev().collect();
         let text = format!("\u{feff}# a plot\n{},engine\n{},native\n", columns.join(","), values.join(","));

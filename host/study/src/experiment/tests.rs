@@ -52,7 +52,7 @@ fn a_controller_gets_the_same_field_with_and_without_others() {
 }
 
 #[test]
-fn the_firmware_damages_no_plant_and_weeds_up_to_the_bound_where_the_papers_damages_more_the_faster_it_goes() {
+fn unlike_the_papers_controller_the_firmware_damages_no_plant() {
     for seed in 1..=3 {
         let experiment = Experiment { seed, ..experiment(&[1.0, 1.5, 2.0, 2.5, 3.0, 3.5], "transplanted") };
         // A mean swing's: the margin and the slip, which has the tool swing early, cover the slowest.
@@ -76,7 +76,7 @@ fn the_firmware_damages_no_plant_and_weeds_up_to_the_bound_where_the_papers_dama
 }
 
 #[test]
-fn the_ideal_controller_damages_no_plant_in_any_field_and_weeds_more_than_the_firmware() {
+fn the_ideal_controller_weeds_more_and_damages_no_plant() {
     // Without look-ahead, the firmware weeds more, but damages plants.
     for preset in presets().filter(|preset| *preset != "paper") {
         let totals = all(&experiment(&[1.0, 2.5], preset));
@@ -90,7 +90,7 @@ fn the_ideal_controller_damages_no_plant_in_any_field_and_weeds_more_than_the_fi
 }
 
 #[test]
-fn in_every_row_of_every_preset_the_loss_budget_adds_up_and_who_damages_no_plant_keeps_below_the_bound() {
+fn the_loss_budget_adds_up_and_the_bound_holds_in_every_row() {
     for preset in presets() {
         for seed in 1..=3 {
             // One row a plot: an average would hide a row, and a plot with one damaged plant may weed more than its
@@ -200,7 +200,7 @@ fn damaged_of_seen(changes: &[(&str, f64)], replications: u32) -> (u32, u32) {
 }
 
 #[test]
-fn a_trailing_arm_damages_plants_unless_its_margin_is_wider_by_what_it_carries() {
+fn a_trailing_arm_damages_plants_unless_its_margin_is_wider() {
     let trailing = ("machine.arm", 1.0);
     let (damaged, seen) = damaged_of_seen(&[trailing], 30);
     assert!(damaged * 1000 > seen, "{damaged} of {seen}");
@@ -212,7 +212,7 @@ fn a_trailing_arm_damages_plants_unless_its_margin_is_wider_by_what_it_carries()
 }
 
 #[test]
-fn sway_side_play_and_straying_damage_plants_once_they_are_larger_than_the_machine_is_set_up_for() {
+fn sway_side_play_and_straying_beyond_the_set_up_damage_plants() {
     for change in [("crop.sway_mm", 30.0), ("machine.side_play_mm", 20.0), ("driving.steering_mm", 30.0)] {
         let (damaged, seen) = damaged_of_seen(&[change], 3);
         assert!(damaged * 1000 > seen, "{change:?}: {damaged} of {seen}");

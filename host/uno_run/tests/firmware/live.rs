@@ -43,7 +43,7 @@ fn open(uno: &Background) -> Link {
 }
 
 #[test]
-fn opening_the_port_resets_the_chip_and_the_firmware_says_that_it_is_there() {
+fn opening_the_port_resets_the_chip_and_gets_the_version() {
     let uno = start(product());
     for _ in 0..2 {
         assert!(open(&uno).version().starts_with(env!("CARGO_PKG_VERSION")));
@@ -80,7 +80,7 @@ fn avrdude(port: &Path, baud: &str, operation: &str) {
 }
 
 #[test]
-fn avrdude_writes_the_flash_through_the_old_bootloader_and_leaves_that_alone() {
+fn the_old_bootloader_writes_the_flash_but_not_itself() {
     let bootloader = Bootloader::read(Path::new(OLD_BOOTLOADER)).expect("setup.sh installs arduino-core-avr");
     let uno = start(Setup { bootloader: Some(bootloader.clone()), ..Setup::default() });
     let mut flash = vec![0; 10_000];

@@ -143,7 +143,7 @@ const UNDISTURBED: [usize; 3] = [0, 3, 5];
 struct Stalled;
 
 #[test]
-fn of_six_rows_in_real_time_one_that_is_lost_reset_or_in_alarm_disturbs_no_other_and_all_hold() {
+fn a_lost_reset_or_alarmed_row_disturbs_no_other_row() {
     assert!((0..3).any(|_| six_rows_in_real_time().is_ok()), "the computer stalls each time, or a row disturbs others");
 }
 
@@ -208,7 +208,7 @@ fn twelve_rows_hold_at_once_however_slow_the_computer_is() {
 }
 
 #[test]
-fn all_rows_count_the_same_ticks_of_the_wheel_that_they_share_and_each_sees_its_own_plants() {
+fn all_rows_count_the_shared_wheel_and_see_their_own_plants() {
     let mut machine = LiveRows::start(setups((1..=3).map(|seed| row(12, seed)).collect(), true)).expect("they start");
     let ran = machine.run(&AtomicBool::new(false), Some(Duration::from_secs(8)));
     let ran = ran.map_err(|(row, error)| format!("row {row}: {error}")).expect("they run");

@@ -252,7 +252,7 @@ fn a_row_with_changes_of_speed_and_a_stop_is_decided_the_same_on_the_host() {
 /// sets off, while it accelerates, or while it rolls past plants. The operator types at random times, and every other
 /// PC is busy now and then.
 #[test]
-fn random_rows_are_decided_the_same_on_the_host_for_all_commands_and_delays() {
+fn random_rows_are_replayed_with_the_same_decisions_on_the_host() {
     let rows = cases(20);
     let replayed: Vec<Replayed> = (0..rows)
         .into_par_iter()
@@ -322,7 +322,7 @@ fn start_now_over_unseen_ground_is_known_from_start() {
 }
 
 #[test]
-fn an_alarm_of_the_beam_is_raised_again_and_the_rest_of_the_detection_is_cut() {
+fn the_replay_raises_a_beam_alarm_and_cuts_the_detection() {
     let canopies = vec![Canopy::plant(600.0, 150.0), Canopy::plant(1500.0, 700.0), Canopy::plant(2300.0, 150.0)];
     let row = Row::new(canopies).expect("plants are a row");
     let motion = Motion::steady(0.0, 500.0, 500.0, 3200.0).change_speed(0.0, 500.0);

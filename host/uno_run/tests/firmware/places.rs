@@ -163,7 +163,7 @@ fn errors_m(job: &Job, row: &Row, setup: &ReceiverSetup) -> Vec<(f64, Basis)> {
 const MACHINE_M: f64 = 0.015;
 
 #[test]
-fn places_come_back_within_the_receivers_error_through_outages_jumps_and_damaged_lines() {
+fn despite_faults_positions_lie_within_the_receivers_error() {
     let (row, motion) = (row(), motion());
     let beam = Offset { ahead_m: 0.6, right_m: -0.25 };
     let trouble = Trouble { every_s: 12.0, outage_s: 5.0..8.0, jump_s: 9.0..10.0, jump_m: 2.0, damaged: 0.02 };
@@ -216,7 +216,7 @@ fn places_come_back_within_the_receivers_error_through_outages_jumps_and_damaged
 }
 
 #[test]
-fn without_a_machine_s_trouble_the_ground_weeded_is_where_the_tool_was_in_the_row() {
+fn without_faults_the_weeded_ground_is_where_the_tool_was() {
     let (row, motion) = (row(), motion());
     let setup =
         ReceiverSetup { error_mm: 0.0, beam: Offset { ahead_m: 0.5, right_m: 0.1 }, ..ReceiverSetup::default() };
@@ -240,7 +240,7 @@ fn without_a_machine_s_trouble_the_ground_weeded_is_where_the_tool_was_in_the_ro
 }
 
 #[test]
-fn a_receiver_that_is_unplugged_for_long_costs_places_and_no_line_of_the_machine() {
+fn an_unplugged_receiver_costs_positions_and_no_machine_line() {
     let (row, motion) = (row(), motion());
     let setup = ReceiverSetup { rate_hz: 2.0, ..ReceiverSetup::default() };
     let antenna = Antenna { beam_ahead_mm: 500.0, ..Antenna::default() };

@@ -118,7 +118,7 @@ fn an_alarm_is_shown_with_advice_until_it_is_cleared() {
 }
 
 #[test]
-fn a_warning_is_shown_until_it_ends_and_not_in_place_of_another_row_s_alarm() {
+fn a_warning_does_not_hide_the_alarm_of_another_row() {
     let mut model = rows(4);
     model.update(0, Happening::Warning(Some(Warning::NoPlants)));
     let drawn = screen_of(&model, 80, 24);
@@ -147,7 +147,7 @@ fn a_lost_machine_is_shown_as_lost() {
 }
 
 #[test]
-fn a_state_that_is_not_understood_for_a_second_is_unknown_and_so_is_that_before_the_first() {
+fn a_state_not_understood_for_a_second_is_shown_as_unknown() {
     for (columns, lines) in SIZES {
         let known = |model: &Model| !screen_of(model, columns, lines).contains("state unknown");
         let began = Instant::now();
@@ -302,7 +302,7 @@ fn six_and_twelve_rows_are_seen_at_a_glance_on_screens_of_both_sizes() {
 }
 
 #[test]
-fn one_row_in_a_small_terminal_keeps_its_state_its_alarm_and_the_key_for_hold() {
+fn one_row_in_a_small_terminal_shows_state_alarm_and_hold_key() {
     let mut model = machine_in_row(&[AT_WORK]);
     insta::assert_snapshot!(screen_of(&model, 40, 10));
     insta::assert_snapshot!(screen_of(&model, 80, 24));
@@ -313,7 +313,7 @@ fn one_row_in_a_small_terminal_keeps_its_state_its_alarm_and_the_key_for_hold() 
 }
 
 #[test]
-fn on_no_screen_of_40_columns_and_10_lines_or_more_the_key_or_an_alarmed_or_lost_row_is_missing() {
+fn every_screen_shows_the_hold_key_and_alarmed_or_lost_rows() {
     for count in 1..=24 {
         for (columns, lines) in [(40, 10), (40, 30), (57, 11), (80, 15), (80, 16), (80, 24), (200, 10), (120, 50)] {
             let mut model = rows(count);

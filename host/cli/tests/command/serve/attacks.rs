@@ -182,7 +182,7 @@ fn hold_is_obeyed_under_an_attack_of_half_open_connections() {
 
 /// The server accepts all of them before it reads from any, so that each place is taken and lost at once.
 #[test]
-fn a_new_hold_is_read_although_a_crowd_of_half_open_connections_comes_with_it() {
+fn a_hold_is_read_despite_a_crowd_of_half_open_connections() {
     let folder = folder();
     let (_uno, port) = uno(&folder, "uno", &["--stand"]);
     let served = serve(&folder, &[&port], &["--allow-start"]);
@@ -244,7 +244,7 @@ fn hold_is_obeyed_under_an_attack_of_files_that_are_not_read() {
 }
 
 #[test]
-fn a_request_that_comes_in_chunks_or_has_two_lengths_is_refused_and_does_nothing() {
+fn a_request_in_chunks_or_with_two_lengths_is_refused() {
     let folder = folder();
     let (_uno, port) = uno(&folder, "uno", &["--stand"]);
     let served = serve(&folder, &[&port], &[]);
@@ -304,7 +304,7 @@ fn files(process: &Running) -> usize {
 }
 
 #[test]
-fn a_stream_that_reads_nothing_is_closed_before_the_buffers_are_full_and_so_is_one_that_reads_a_byte_at_a_time() {
+fn a_stream_that_hardly_reads_is_closed_before_buffers_fill() {
     let folder = folder();
     let (_uno, port) = uno(&folder, "uno", &["--stand"]);
     let served = serve(&folder, &[&port], &[]);

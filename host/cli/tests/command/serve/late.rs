@@ -59,7 +59,7 @@ fn assert_came_after_hold(answer: &(u16, String)) {
 }
 
 #[test]
-fn a_command_says_what_its_sender_has_seen_and_hold_needs_to_have_seen_nothing() {
+fn every_command_but_hold_states_what_its_sender_has_seen() {
     let folder = folder();
     let (_uno, port) = uno(&folder, "uno", &["--stand"]);
     let served = serve(&folder, &[&port], &["--allow-start"]);

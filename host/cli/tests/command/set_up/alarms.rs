@@ -51,7 +51,7 @@ fn an_end_switch_that_is_not_there_is_set_off_when_its_alarm_comes() {
 }
 
 #[test]
-fn an_alarm_while_the_beam_is_set_is_shown_and_cleared_and_the_step_goes_on() {
+fn the_beam_step_continues_after_an_alarm_is_cleared() {
     let folder = TempDir::new().expect("there is room for a folder");
     let (_uno, mut machine) = uno(folder.path(), &["--roll", "--link", "uno", "--speed", "5"]);
     // Narrower than its plants.
