@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use clap::Args;
-use frame::{say, with_bar};
+use frame::{Results, with_bar};
 use knn_bench::Task;
 use serde_json::{Value, json};
 use uno::elf::Size;
@@ -34,10 +34,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let lateness = with_bar("swinging", |show| swings::lateness(&elf, &swings::Rows::at_walking_speed(0..ROWS), show))?;
     let figures = Figures { classifier, size: Size::read(&elf)?, rates, jitter, lateness };
     if arguments.json {
-        return say!("{:#}", in_json(&figures));
+        return writeln!(Results, "{:#}", in_json(&figures));
     }
     for table in figures.tables() {
-        say!("{table}")?;
+        writeln!(Results, "{table}")?;
     }
     Ok(())
 }

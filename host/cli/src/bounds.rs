@@ -6,7 +6,7 @@ use anyhow::{Result, bail, ensure};
 use avr_bounds::command::{Options, Report, report};
 use avr_bounds::{Budgets, Held, Program};
 use clap::Args;
-use frame::{Finding, print, tell};
+use frame::{Finding, Messages, Results};
 use std::path::{Path, PathBuf};
 use uno::elf::Image;
 use uno_run::firmware;
@@ -37,7 +37,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     }
     let elf = arguments.elf.clone().map_or_else(firmware::build, Ok)?;
     let Report { text, keeps } = report(&elf, &options)?;
-    print(format_args!("{text}"))?;
+    write!(Results, "{text}")?;
     Ok(Finding::of(keeps))
 }
 
@@ -102,7 +102,11 @@ impl Firmware {
                 elf.display()
             );
         }
-        tell!("Warning: the bounds of {} are not proved: {why}. So {RISK}: keep its tool off the field", elf.display());
+        writeln!(
+            Messages,
+            "Warning: the bounds of {} are not proved: {why}. So {RISK}: keep its tool off the field",
+            elf.display()
+        );
         Ok(())
     }
 }

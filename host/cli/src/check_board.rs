@@ -6,7 +6,7 @@ use check_board::Boards;
 use check_board::desk::Desk;
 use check_board::run::{Extent, run as check_run};
 use clap::Args;
-use frame::{Finding, OutName, Replace, print, tell, with_bar, write_if_asked};
+use frame::{Finding, Messages, OutName, Replace, Results, with_bar, write_if_asked};
 use link::row_names::plugged;
 use std::cell::Cell;
 use std::path::{Path, PathBuf};
@@ -74,7 +74,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     let result = with_bar("checking", |show| {
         check_run(&mut boards, extent, |what, share| {
             if last.replace(what) != what {
-                tell!("Next: {what}");
+                writeln!(Messages, "Next: {what}");
             }
             show(share);
         })
@@ -85,7 +85,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     }
     let mut report = result?;
     report.board.clone_from(&arguments.board);
-    let printed = print(format_args!("{}", if arguments.json { report.json() } else { report.text() }));
+    let printed = write!(Results, "{}", if arguments.json { report.json() } else { report.text() });
     write_if_asked(page.as_ref(), "Written", arguments.json, |to| Ok(to.write_all(report.page().as_bytes())?))?;
     printed?;
     Ok(Finding::of(report.is_good()))

@@ -5,7 +5,7 @@
 use anyhow::Result;
 use clap::Args;
 use field::row::Kind;
-use frame::{Finding, say, source, whole_within};
+use frame::{Finding, Results, source, whole_within};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use study::training::table::{self, Recorded};
@@ -43,11 +43,11 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     let labelled = objects.iter().filter_map(|object| Some((object.kind?, model.class(&object.features))));
     let confusion: Confusion = labelled.collect();
     if arguments.json {
-        say!("{:#}", as_json(&model, &objects)?)?;
+        writeln!(Results, "{:#}", as_json(&model, &objects)?)?;
     } else {
-        say!("{}", model.table(&objects)?)?;
+        writeln!(Results, "{}", model.table(&objects)?)?;
         if confusion.total() > 0 {
-            say!("\n{confusion}")?;
+            writeln!(Results, "\n{confusion}")?;
         }
     }
     Ok(Finding::of(confusion.plants_taken_for_weeds() == 0))

@@ -6,7 +6,7 @@
 use anyhow::Result;
 use clap::Args;
 use clap_complete::Shell;
-use frame::{print, program};
+use frame::{Results, program};
 
 #[derive(Args)]
 #[command(after_help = "\
@@ -25,5 +25,5 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let mut command = program::grammar::<crate::Arguments>();
     let mut script = Vec::new();
     clap_complete::generate(arguments.shell, &mut command, "weeder", &mut script);
-    print(format_args!("{}", String::from_utf8_lossy(&script)))
+    write!(Results, "{}", String::from_utf8_lossy(&script))
 }

@@ -3,7 +3,7 @@
 
 use anyhow::Result;
 use clap::Args;
-use frame::{print, say, source};
+use frame::{Results, source};
 use mechanics::design::Design;
 use mechanics::machine::Machine;
 use mechanics::swing::Swing;
@@ -37,7 +37,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let own = arguments.machine.as_deref().map(file::read).transpose()?;
     let machine = own.unwrap_or_default();
     if arguments.print_machine {
-        print(format_args!("{}", machine.to_toml()))?;
+        write!(Results, "{}", machine.to_toml())?;
     } else if arguments.against_paper {
         against_paper(own.as_ref(), arguments.json)?;
     } else {
@@ -53,37 +53,40 @@ fn design(machine: &Machine, json: bool) -> Result<()> {
     if json {
         let set = swing.as_ref().ok().map(Swing::set_lines);
         let (inputs, no_swing) = (machine.inputs(), swing.as_ref().err());
-        return say!(
+        return writeln!(
+            Results,
             "{:#}",
             json!({ "inputs": inputs, "figures": figures, "swing": swing.as_ref().ok(), "no_swing": no_swing, "set": set })
         );
     }
     let (inputs, paper) = (machine.inputs(), Machine::default().inputs());
     let differing = inputs.iter().zip(&paper).filter(|(input, paper)| input.value != paper.value).count();
-    say!("{differing} of the machine's {} values differ from the paper's machine.", inputs.len())?;
-    say!("{}\n", report::design_table(&figures))?;
+    writeln!(Results, "{differing} of the machine's {} values differ from the paper's machine.", inputs.len())?;
+    writeln!(Results, "{}\n", report::design_table(&figures))?;
     let concerns = figures.iter().filter(|figure| figure.concern).count();
-    say!("{concerns} of {} figures ask for a change (!).\n", figures.len())?;
+    writeln!(Results, "{concerns} of {} figures ask for a change (!).\n", figures.len())?;
     match swing {
         Ok(swing) => {
             let said = swing.sentences(machine, design.servo_torque).join("\n");
-            say!(
+            writeln!(
+                Results,
                 "{said}\nFor the firmware's console, until the servo has been timed:\n{}",
                 swing.set_lines().join("\n")
             )
         }
-        Err(problem) => say!("The tool cannot swing as it has to: {problem}."),
+        Err(problem) => writeln!(Results, "The tool cannot swing as it has to: {problem}."),
     }
 }
 
 fn against_paper(own: Option<&Machine>, json: bool) -> Result<()> {
     let comparisons = paper::compare(own)?;
     if json {
-        return say!("{:#}", json!({ "comparisons": comparisons }));
+        return writeln!(Results, "{:#}", json!({ "comparisons": comparisons }));
     }
-    say!("{}\n\n{}\n", report::comparison_table(&comparisons), report::remark_table(&comparisons))?;
+    writeln!(Results, "{}\n\n{}\n", report::comparison_table(&comparisons), report::remark_table(&comparisons))?;
     let count = |verdict| comparisons.iter().filter(|comparison| comparison.verdict == verdict).count();
-    say!(
+    writeln!(
+        Results,
         "Of {} printed figures {} are right, {} follow from an error before them, and {} are wrong.",
         comparisons.len(),
         count(paper::Verdict::Right),

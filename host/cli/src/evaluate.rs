@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result};
 use clap::Args;
-use frame::{OutFolder, OutName, Replace, command_line, number_within, print, say, source, tell, whole_within};
+use frame::{Messages, OutFolder, OutName, Replace, Results, command_line, number_within, source, whole_within};
 use link::settings::shown;
 use logbook::log::{Entry, Kind};
 use logbook::worked::worked;
@@ -59,14 +59,15 @@ pub fn run(arguments: &Arguments) -> Result<()> {
                 entry.kind == Kind::Setting && shown(&entry.text).is_some_and(|(setting, value)| !setting.allows(value))
             };
             if let Some(Entry { number, text, .. }) = log.iter().find(is_foreign) {
-                tell!(
+                writeln!(
+                    Messages,
                     "Warning: line {number} of the log has `{text}`, which this version does not allow: it counts as unknown"
                 );
             }
             let stretches = worked(&log);
             let joined = field_log::join(&mut records, &stretches, &arguments.plots)?;
             let warnings = joined.iter().flat_map(|of_log| [of_log.warning(), of_log.too_few_plants()]);
-            warnings.flatten().for_each(|warning| tell!("{warning}"));
+            warnings.flatten().for_each(|warning| writeln!(Messages, "{warning}"));
             (Analysis::at_levels(records, levels_km_h), Some(joined))
         }
         None => (Analysis::at_speeds(records, &arguments.speeds), None),
@@ -76,15 +77,15 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         (true, joined) => {
             let mut json = in_json(&analysis);
             json["log"] = json!(joined);
-            say!("{json:#}")
+            writeln!(Results, "{json:#}")
         }
-        (false, Some(joined)) => print(format_args!("{}\n\n{analysis}", field_log::of_log_table(joined))),
-        (false, None) => print(format_args!("{analysis}")),
+        (false, Some(joined)) => write!(Results, "{}\n\n{analysis}", field_log::of_log_table(joined)),
+        (false, None) => write!(Results, "{analysis}"),
     };
     if let Some(folder) = &folder {
         write_report(&analysis, joined.as_deref(), arguments, folder)?;
         if !arguments.json {
-            say!("\nReport      {}", folder.path().join(REPORT).display())?;
+            writeln!(Results, "\nReport      {}", folder.path().join(REPORT).display())?;
         }
     }
     printed

@@ -7,7 +7,7 @@ use clap::{Args, Subcommand};
 use comfy_table::{Table, presets};
 use field::counted;
 use field::row::Kind;
-use frame::{Finding, OutFile, OutName, Replace, say, source, tell};
+use frame::{Finding, Messages, OutFile, OutName, Replace, Results, source};
 use link::examples::{self, OnMachine, Taught, contradiction, example_of, features_of};
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
@@ -83,13 +83,21 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
             let file = file.as_ref().map(|file| file.file(*replace)).transpose()?;
             let OnMachine { taught, spoiled } = on_machine(port, file.as_ref().map(OutFile::path))?;
             let taught = examples_of(taught);
-            let printed =
-                if *json { say!("{:#}", Value::from_iter(taught.iter().filter_map(in_json))) } else { Ok(()) };
+            let printed = if *json {
+                writeln!(Results, "{:#}", Value::from_iter(taught.iter().filter_map(in_json)))
+            } else {
+                Ok(())
+            };
             if let Some(file) = file {
                 let objects: Vec<Labelled> = taught.iter().filter_map(object).collect();
                 file.write(|to| Ok(listing::write_csv(&objects, to)?))?;
                 if !json {
-                    say!("The taught examples are in {}: {} examples", file.path().display(), taught.len())?;
+                    writeln!(
+                        Results,
+                        "The taught examples are in {}: {} examples",
+                        file.path().display(),
+                        taught.len()
+                    )?;
                 }
             }
             printed?;
@@ -102,11 +110,11 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
             }
             let pushed = examples::push(&mut port.open()?, &wanted, *replace)?;
             match *json {
-                true => say!("{:#}", json!({ "taught": pushed.taught, "forgotten": pushed.forgotten }))?,
+                true => writeln!(Results, "{:#}", json!({ "taught": pushed.taught, "forgotten": pushed.forgotten }))?,
                 false => {
-                    say!("Taught: {}. Known already: {}.", pushed.taught, wanted.len() - pushed.taught)?;
+                    writeln!(Results, "Taught: {}. Known already: {}.", pushed.taught, wanted.len() - pushed.taught)?;
                     if *replace {
-                        say!("Forgotten: {}.", pushed.forgotten)?;
+                        writeln!(Results, "Forgotten: {}.", pushed.forgotten)?;
                     }
                 }
             }
@@ -120,10 +128,14 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
             match *json {
                 true => {
                     let list = |examples: &[Taught]| Value::from_iter(examples.iter().filter_map(in_json));
-                    say!("{:#}", json!({ "only_in_file": list(&in_file), "only_on_machine": list(&on_machine) }))?;
+                    writeln!(
+                        Results,
+                        "{:#}",
+                        json!({ "only_in_file": list(&in_file), "only_on_machine": list(&on_machine) })
+                    )?;
                 }
-                false if is_same => say!("The machine was taught the examples in {}", file.display())?,
-                false => say!("{}", differences(&in_file, &on_machine))?,
+                false if is_same => writeln!(Results, "The machine was taught the examples in {}", file.display())?,
+                false => writeln!(Results, "{}", differences(&in_file, &on_machine))?,
             }
             Ok(Finding::of(is_same && found.spoiled == 0))
         }
@@ -142,7 +154,7 @@ fn on_machine(port: &Port, replaced: Option<&Path>) -> Result<OnMachine> {
         if let Some(table) = replaced.filter(|path| path.metadata().is_ok_and(|there| there.len() > 0)) {
             bail!("{invalid}. {} is not replaced", table.display());
         }
-        tell!("{invalid}");
+        writeln!(Messages, "{invalid}");
     }
     Ok(found)
 }
@@ -165,7 +177,7 @@ pub fn in_table(file: &Path) -> Result<Vec<Taught>> {
         table::LABEL
     );
     if unlabelled > 0 {
-        tell!("Passed over {unlabelled} without a label");
+        writeln!(Messages, "Passed over {unlabelled} without a label");
     }
     Ok(examples)
 }

@@ -7,7 +7,7 @@
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use files::{bounded_file, whole_file};
-use frame::{Finding, say, tell};
+use frame::{Finding, Messages, Results};
 use std::env;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -51,8 +51,8 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     if differ.is_empty() {
         return Ok(Finding::Good);
     }
-    say!("These figures differ from their commands' output; `weeder figures` updates them:")?;
-    say!("{}", differ.join("\n"))?;
+    writeln!(Results, "These figures differ from their commands' output; `weeder figures` updates them:")?;
+    writeln!(Results, "{}", differ.join("\n"))?;
     Ok(Finding::Bad)
 }
 
@@ -77,7 +77,7 @@ fn print(command: &str) -> Result<String> {
     let words = shlex::split(command).with_context(|| format!("unbalanced quotes in `{command}`"))?;
     let [program, arguments @ ..] = words.as_slice() else { bail!("there is no command") };
     ensure!(program == "weeder", "figures come from `weeder`, not from `{program}`");
-    tell!("{command}");
+    writeln!(Messages, "{command}");
     let weeder = env::current_exe().context("the running program cannot be found")?;
     let output = Command::new(weeder).args(arguments).stderr(Stdio::null()).output()?;
     // Status 1 is a finding, such as a damaged plant.

@@ -8,7 +8,7 @@ use crate::bounds::Firmware;
 use crate::ports::Port;
 use anyhow::{Result, ensure};
 use clap::Args;
-use frame::say;
+use frame::Results;
 use link::Claim;
 use link::row_names::Board;
 use uno::bootloader::check_room;
@@ -64,20 +64,22 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let flash = Image::read(&elf)?.flash;
     check_room(flash.len(), room(bootloader, converter))?;
     arguments.firmware.check(&elf)?;
-    say!("Writing {} to the Uno at {port}", elf.display())?;
-    say!(
+    writeln!(Results, "Writing {} to the Uno at {port}", elf.display())?;
+    writeln!(
+        Results,
         "The servo has no signal for {} s, and the tool may fall: keep clear of it.",
         seconds(flash.len(), bootloader.baud)
     )?;
     if arguments.old_bootloader {
-        say!(
+        writeln!(
+            Results,
             "This bootloader does not start the machine again after a stop by its watchdog. The tool then has no signal \
              until you switch the power off and on. Before work in a field, burn optiboot with the Arduino IDE."
         )?;
     }
     let (succeeded, signature) = avrdude::write(&flash, &port, bootloader.baud)?;
     ensure!(succeeded, "avrdude did not succeed: {}", why(&claim, &port, bootloader, other, signature));
-    say!("Done: the Uno runs it. `weeder monitor --port {}` talks to it.", shlex::try_quote(&port)?)
+    writeln!(Results, "Done: the Uno runs it. `weeder monitor --port {}` talks to it.", shlex::try_quote(&port)?)
 }
 
 /// Bytes of flash for the firmware on a board with this converter. A Nano with optiboot reserves 2048 bytes as for the

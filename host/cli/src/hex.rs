@@ -4,7 +4,7 @@
 use crate::bounds::Firmware;
 use anyhow::Result;
 use clap::Args;
-use frame::{OutName, Replace, say};
+use frame::{OutName, Replace, Results};
 use uno::elf::Image;
 use uno::hex;
 
@@ -34,5 +34,5 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let flash = Image::read(&elf)?.flash;
     arguments.firmware.check(&elf)?;
     out.write(|to| Ok(to.write_all(hex::text(&flash).as_bytes())?))?;
-    say!("Written     {}, {} bytes of flash", out.path().display(), flash.len())
+    writeln!(Results, "Written     {}, {} bytes of flash", out.path().display(), flash.len())
 }

@@ -5,7 +5,7 @@ use anyhow::Result;
 use clap::Args;
 use comfy_table::{Table, presets};
 use field::counted;
-use frame::{OutName, Replace, number_within, print, say, source, tell};
+use frame::{Messages, OutName, Replace, Results, number_within, source};
 use gps::summary::{Stand, Summary};
 use gps::wheel::Ratio;
 use gps::{Job, Wanted, map, picture};
@@ -69,7 +69,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         has_receiver |= log.iter().any(|entry| matches!(entry.kind, Kind::GpsFound | Kind::Gps | Kind::GpsDamaged));
         let (name, job) = (name(path, &arguments.logs), Job::read(&log, &wanted));
         if job.without_wheel > 0 {
-            tell!(
+            writeln!(
+                Messages,
                 "{name}: the wheel of {} is unknown, and nothing is counted there: the log lacks the settings, or has one that this version does not allow",
                 counted(job.without_wheel as usize, "status line")
             );
@@ -81,9 +82,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let printed = match arguments.json {
         true => {
             let records = counted.iter().map(|(record, summary)| json!({ "record": record, "count": summary }));
-            say!("{:#}", serde_json::Value::from_iter(records))
+            writeln!(Results, "{:#}", serde_json::Value::from_iter(records))
         }
-        false => print(format_args!("{}\n", shown(&counted))),
+        false => write!(Results, "{}\n", shown(&counted)),
     };
     let named: Vec<(&str, &Job)> = jobs.iter().map(|(name, job)| (name.as_str(), job)).collect();
     out.write(|to| Ok(writeln!(to, "{}", map::features(&named))?))?;
@@ -91,7 +92,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let jobs: Vec<&Job> = jobs.iter().map(|(_, job)| job).collect();
         match picture::draw(&jobs, &picture::Words::default()) {
             Some(drawn) => svg.write(|to| Ok(svg::write(to, &drawn)?))?,
-            None => tell!("{} is not drawn: no event in the records has a position", svg.path().display()),
+            None => writeln!(Messages, "{} is not drawn: no event in the records has a position", svg.path().display()),
         }
     }
     if let Some(table) = &table {
@@ -103,11 +104,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         } else {
             "`weeder record --gps PORT` records a receiver"
         };
-        tell!("The records have no fix, so no event has a position: {advice}");
+        writeln!(Messages, "The records have no fix, so no event has a position: {advice}");
     }
     for (record, summary) in &counted {
         for problem in problems(summary) {
-            tell!("{record}: {problem}");
+            writeln!(Messages, "{record}: {problem}");
         }
     }
     printed

@@ -5,7 +5,7 @@
 
 use anyhow::{Context, Result};
 use clap::{Args, builder::PossibleValuesParser};
-use frame::{OutFile, OutFolder, OutName, Replace, say, tell};
+use frame::{Messages, OutFile, OutFolder, OutName, Replace, Results};
 use serde::Serialize;
 use std::env;
 use std::fs;
@@ -73,8 +73,13 @@ impl Part {
         let header = Header::new(self.program, command, self.shard, all, settings);
         let count = outcomes.len();
         self.out.write(|to| Ok(shard::write(&header, outcomes, to)?))?;
-        say!("Written: part {} of the {command}, {count} of {all}, to {}", self.shard, self.out.path().display())?;
-        tell!("Pace: {:.1} s", self.began.elapsed().as_secs_f64());
+        writeln!(
+            Results,
+            "Written: part {} of the {command}, {count} of {all}, to {}",
+            self.shard,
+            self.out.path().display()
+        )?;
+        writeln!(Messages, "Pace: {:.1} s", self.began.elapsed().as_secs_f64());
         Ok(())
     }
 }

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use clap::Args;
-use frame::{OutName, Replace, command_line, number_within, print, say, whole_within};
+use frame::{OutName, Replace, Results, command_line, number_within, whole_within};
 use study::plan::Plan;
 use study::sweep::{SPACINGS_CM, SPEEDS_KM_H};
 use study::table::distinct;
@@ -70,11 +70,17 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         None => {
             let mut table = Vec::new();
             plan.write_csv(&notes, &mut table)?;
-            print(format_args!("{}", String::from_utf8_lossy(&table)))
+            write!(Results, "{}", String::from_utf8_lossy(&table))
         }
         Some(out) => {
             out.write(|to| Ok(plan.write_csv(&notes, to)?))?;
-            say!("Written: {}, {} plots in {} blocks", out.path().display(), plan.plots().len(), plan.blocks)
+            writeln!(
+                Results,
+                "Written: {}, {} plots in {} blocks",
+                out.path().display(),
+                plan.plots().len(),
+                plan.blocks
+            )
         }
     }
 }

@@ -6,7 +6,7 @@
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use etcetera::BaseStrategy;
-use frame::tell;
+use frame::Messages;
 use link::Link;
 use link::connection::Opener;
 use link::row_names::{Board, Names, Plugged, Row, plugged, wrong_with};
@@ -227,7 +227,7 @@ impl Chosen {
         let mut failed = Vec::new();
         for (row, done) in self.rows.iter().zip(&done) {
             if let Err(error) = done {
-                tell!("error: {}: {error:#}", row.name);
+                writeln!(Messages, "error: {}: {error:#}", row.name);
                 failed.push(row.name.as_str());
             }
         }

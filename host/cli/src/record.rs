@@ -5,7 +5,7 @@ use crate::ports::{Chosen, Ports};
 use crate::receiver::GpsArguments;
 use anyhow::{Result, bail, ensure};
 use clap::Args;
-use frame::{OutName, Replace, tell};
+use frame::{Messages, OutName, Replace};
 use link::advice;
 use link::rows::{Heard, Rows, What};
 use link::session::Happening;
@@ -54,7 +54,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let mut gps = gps.map(|(receiver, _)| receiver);
     let (rows, _) = open(&chosen)?;
     let stop = ctrl_c()?;
-    tell!("Recording into {}, Ctrl-C ends it", arguments.out.display());
+    writeln!(Messages, "Recording into {}, Ctrl-C ends it", arguments.out.display());
     while !stop.load(Ordering::Relaxed) {
         if let Some(gps) = &mut gps {
             let time_ms = logs.time_ms(gps.row, Instant::now());
@@ -63,7 +63,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             logs.go_on_after(written, gps.row, &chosen)?;
             for (kind, line) in &said {
                 if let Kind::GpsFound | Kind::GpsLost | Kind::GpsMark = kind {
-                    tell!("Receiver: {line}");
+                    writeln!(Messages, "Receiver: {line}");
                 }
             }
         }
@@ -82,7 +82,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         }
     }
     if let Some(gps) = &gps {
-        tell!("{}", gps.summary());
+        writeln!(Messages, "{}", gps.summary());
     }
     logs.end()
 }
@@ -91,20 +91,20 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 fn tell_of(chosen: &Chosen, row: usize, happening: Happening) {
     match happening {
         Happening::Connected { version, shown, .. } => {
-            tell!("{}", chosen.under_name(row, &format!("weeder {version} is there")));
+            writeln!(Messages, "{}", chosen.under_name(row, &format!("weeder {version} is there")));
             if let Some(other) = other_version(&version, &shown) {
-                tell!("{}", chosen.under_name(row, &other));
+                writeln!(Messages, "{}", chosen.under_name(row, &other));
             }
         }
         Happening::Started { while_at_work: Some(cause), .. } => {
             let mut errors = io::stderr();
             if errors.is_terminal() {
-                // As for `tell!`: a bell that fails ends no record.
+                // As for `Messages`: a bell that fails ends no record.
                 let _ = errors.write_all(b"\x07");
             }
-            tell!("{}", chosen.under_name(row, &advice::restarted(&cause)));
+            writeln!(Messages, "{}", chosen.under_name(row, &advice::restarted(&cause)));
         }
-        Happening::Lost(why) => tell!("{}", chosen.under_name(row, &why)),
+        Happening::Lost(why) => writeln!(Messages, "{}", chosen.under_name(row, &why)),
         _ => {}
     }
 }
@@ -123,7 +123,7 @@ pub fn open(chosen: &Chosen) -> Result<(Rows, usize)> {
     }
     missing.sort_by_key(|(row, _)| *row);
     for (row, why) in missing {
-        tell!("{}", chosen.under_name(row, &format!("{:#}", anyhow::Error::from(why))));
+        writeln!(Messages, "{}", chosen.under_name(row, &format!("{:#}", anyhow::Error::from(why))));
     }
     bail!("none of the {} rows is there", rows.count());
 }
@@ -178,7 +178,7 @@ impl Logs {
     /// Reports a log that could not be written. The other rows' logs continue. Fails if no log is left.
     fn go_on_after(&self, written: Result<(), LogError>, row: usize, chosen: &Chosen) -> Result<()> {
         if let Err(error) = written {
-            tell!("error: {}", chosen.under_name(row, &format!("{:#}", anyhow::Error::from(error))));
+            writeln!(Messages, "error: {}", chosen.under_name(row, &format!("{:#}", anyhow::Error::from(error))));
             ensure!(self.0.iter().any(|log| log.is_written), "no log can be written any more");
         }
         Ok(())
@@ -188,7 +188,7 @@ impl Logs {
     fn end(&self) -> Result<()> {
         for Log { path, writer, .. } in &self.0 {
             let now = format!("{} has {} now", path.display(), writer.lines());
-            tell!("{} lines were added: {}", writer.added, if path.exists() { now } else { gone(path) });
+            writeln!(Messages, "{} lines were added: {}", writer.added, if path.exists() { now } else { gone(path) });
         }
         self.check()?;
         self.0.iter().find(|log| !log.path.exists()).map_or(Ok(()), |log| bail!(gone(&log.path)))

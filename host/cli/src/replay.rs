@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result};
 use clap::Args;
-use frame::{Finding, say, source};
+use frame::{Finding, Results, source};
 use logbook::{log, replay};
 use serde_json::json;
 use std::path::PathBuf;
@@ -34,21 +34,19 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
             "difference": difference,
             "notes": replayed.notes,
         });
-        say!("{result:#}")?;
+        writeln!(Results, "{result:#}")?;
     } else {
         for note in &replayed.notes {
-            say!("Note: {note}")?;
+            writeln!(Results, "Note: {note}")?;
         }
-        say!(
+        writeln!(
+            Results,
             "The same: {} detections, {} alarms and {} swings, which differ by {} ticks at the most",
-            replayed.objects,
-            replayed.alarms,
-            replayed.swings,
-            replayed.farthest_swing
+            replayed.objects, replayed.alarms, replayed.swings, replayed.farthest_swing
         )?;
         match &difference {
-            Some(difference) => say!("But {name}, {difference}")?,
-            None => say!("The decisions of {name} are those of this version")?,
+            Some(difference) => writeln!(Results, "But {name}, {difference}")?,
+            None => writeln!(Results, "The decisions of {name} are those of this version")?,
         }
     }
     Ok(Finding::of(difference.is_none()))

@@ -4,7 +4,7 @@ use crate::ports::{NamesFile, unnamed};
 use anyhow::{Result, anyhow};
 use clap::{Args, Subcommand};
 use comfy_table::{Table, presets};
-use frame::say;
+use frame::Results;
 use link::LinkError;
 use link::row_names::{Board, Names, Plugged, plugged};
 use serde_json::{Value, json};
@@ -69,15 +69,15 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             names.name(name, board.clone())?;
             names.write()?;
             if let Some(before) = before {
-                say!("{} is forgotten: it was this board", before.name)?;
+                writeln!(Results, "{} is forgotten: it was this board", before.name)?;
             }
-            say!("{name} is {}, in {}", described(&board), names.path().display())
+            writeln!(Results, "{name} is {}, in {}", described(&board), names.path().display())
         }
         Some(Action::Forget { name, file }) => {
             let mut names = file.read()?;
             names.forget(name)?;
             names.write()?;
-            say!("{name} is forgotten, in {}", names.path().display())
+            writeln!(Results, "{name} is forgotten, in {}", names.path().display())
         }
     }
 }
@@ -102,10 +102,10 @@ fn list(names: &Names, json: bool) -> Result<()> {
             };
             json!({ "name": line.name, "serial_number": serial_number, "known_port": known_port, "port": line.port })
         };
-        return say!("{:#}", Value::from_iter(lines.iter().map(value)));
+        return writeln!(Results, "{:#}", Value::from_iter(lines.iter().map(value)));
     }
     if lines.is_empty() {
-        return say!("There is no Uno at any USB port, and {} names no row", names.path().display());
+        return writeln!(Results, "There is no Uno at any USB port, and {} names no row", names.path().display());
     }
     let mut table = Table::new();
     table.load_style(presets::UTF8_BORDERS_ONLY).set_header(["row", "port now", "known by"]);
@@ -113,8 +113,8 @@ fn list(names: &Names, json: bool) -> Result<()> {
         let name = line.name.as_deref().unwrap_or("without a name");
         table.add_row([name, line.port.as_deref().unwrap_or("not there"), &described(&line.board)]);
     }
-    say!("{table}")?;
-    say!("The names are in {}", names.path().display())
+    writeln!(Results, "{table}")?;
+    writeln!(Results, "The names are in {}", names.path().display())
 }
 
 /// The rows, then the Unos without a row.

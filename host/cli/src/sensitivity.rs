@@ -6,7 +6,7 @@ use clap::Args;
 use comfy_table::CellAlignment;
 use field::conditions::{self, Conditions, PARAMETERS};
 use field::tool_path::Effect;
-use frame::{number_within, say, source, tell, whole_within, with_bar};
+use frame::{Messages, Results, number_within, source, whole_within, with_bar};
 use link::settings::Setting;
 use std::collections::HashSet;
 use std::str::FromStr;
@@ -160,7 +160,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Ok(Experiment { conditions, ..experiment.clone() })
     });
     let changed = changed.collect::<Result<Vec<Experiment>>>()?;
-    warnings(&conditions, &changed).iter().for_each(|warning| tell!("Warning: {warning}"));
+    warnings(&conditions, &changed).iter().for_each(|warning| writeln!(Messages, "Warning: {warning}"));
     let header = ["assumption", "here", "in the\nfield"].map(str::to_owned).into_iter();
     let weeded = speeds.iter().map(|speed| format!("weeded\nat {speed}\nkm/h\nin %"));
     let damaged =
@@ -193,7 +193,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         }
         anyhow::Ok(())
     })?;
-    say!("{table}\nField {field}, seed {seed}: {}, plants {spacing} cm apart.", rows(&changed))
+    writeln!(Results, "{table}\nField {field}, seed {seed}: {}, plants {spacing} cm apart.", rows(&changed))
 }
 
 #[cfg(test)]

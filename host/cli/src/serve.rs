@@ -5,7 +5,7 @@ use crate::inside::INSIDE;
 use crate::ports::Ports;
 use anyhow::Result;
 use clap::Args;
-use frame::{say, teller, whole_within};
+use frame::{Results, teller, whole_within};
 use serve::page::Page;
 use serve::{Server, Setup, Tell};
 use std::env;
@@ -72,10 +72,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         tell: Arc::clone(&tell),
     })?;
     let stop = ctrl_c()?;
-    say!("http://{}/ is the page, for this computer alone.", server.here())?;
+    writeln!(Results, "http://{}/ is the page, for this computer alone.", server.here())?;
     if let Some((address, code)) = server.lan() {
-        say!("http://{address}/#{} is the page for a phone in the network.", code.text())?;
-        say!("The code, where it is asked for: {}", code.spelled())?;
+        writeln!(Results, "http://{address}/#{} is the page for a phone in the network.", code.text())?;
+        writeln!(Results, "The code, where it is asked for: {}", code.spelled())?;
     }
     if arguments.open {
         open_in_browser(&format!("http://{}/", server.here()), &tell);

@@ -17,7 +17,7 @@ use anyhow::{Context, Error, Result, ensure};
 use clap::Args;
 use control::alarm::Alarm;
 use files::{bounded_file, whole_file};
-use frame::{say, source, tell};
+use frame::{Messages, Results, source};
 use link::row_names::Board;
 use link::settings::{self, Setting, SettingsError, allowed_top_speed, name, range, unit};
 use link::{ConsoleLine, EventLine, Link, LinkError, Mode, Status, advice};
@@ -60,7 +60,7 @@ pub struct Arguments {
 /// Leads through the steps.
 pub fn run(arguments: &Arguments) -> Result<()> {
     if arguments.simulated {
-        return say!("{}\n{}", simulated::table()?, simulated::about());
+        return writeln!(Results, "{}\n{}", simulated::table()?, simulated::about());
     }
     let path = &arguments.state;
     let kept = match bounded_file::text(path) {
@@ -82,7 +82,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let link = board.open()?;
     let stop = crate::ctrl_c()?;
     match (Guide { link, state, machine, typed: input::typed(), path: path.clone(), watches: false, stop }).lead() {
-        Err(error) if error.is::<End>() => say!("Stopped. The same command continues here."),
+        Err(error) if error.is::<End>() => writeln!(Results, "Stopped. The same command continues here."),
         ended => ended,
     }
 }
@@ -122,7 +122,7 @@ struct Guide {
 
 impl Guide {
     fn lead(mut self) -> Result<()> {
-        say!("Enter takes what stands in [brackets], s leaves a step out, q stops.")?;
+        writeln!(Results, "Enter takes what stands in [brackets], s leaves a step out, q stops.")?;
         self.link.ask("events on")?;
         self.compare()?;
         let steps = steps();
@@ -132,21 +132,21 @@ impl Guide {
             let why = self.open(tasks)?;
             // The last step follows from the others, and is asked for each time.
             if self.state.done.contains(number) && why.is_none() && *number < count {
-                say!("Step {number} of {count}, {title}: done")?;
+                writeln!(Results, "Step {number} of {count}, {title}: done")?;
                 continue;
             }
-            say!("\nStep {number} of {count}: {title}\n  {how}")?;
+            writeln!(Results, "\nStep {number} of {count}: {title}\n  {how}")?;
             if let Err(error) = self.step(tasks) {
                 if error.downcast_ref() != Some(&End::LeaveOut) {
                     return Err(error);
                 }
-                say!("  Left out.")?;
+                writeln!(Results, "  Left out.")?;
                 continue;
             }
             match self.open(tasks)? {
                 None => self.state.done.insert(*number),
                 Some(why) => {
-                    say!("  Step {number} is still open: {why}")?;
+                    writeln!(Results, "  Step {number} is still open: {why}")?;
                     self.state.done.remove(number)
                 }
             };
@@ -186,12 +186,12 @@ impl Guide {
         while self.link.next_line()?.is_some() {}
         // A new board, or one that has lost its settings.
         if alarm == Alarm::SettingsLost {
-            say!("The board has no saved settings: alarm 5-1 settings_lost. If a file has them, type q.")?;
-            say!("Then `weeder settings push FILE.toml` restores them.")?;
+            writeln!(Results, "The board has no saved settings: alarm 5-1 settings_lost. If a file has them, type q.")?;
+            writeln!(Results, "Then `weeder settings push FILE.toml` restores them.")?;
             self.go("Save its present settings, and clear the alarm")?;
             self.link.ask("save")?;
         } else {
-            say!("\n  alarm {}: {}", advice::name(alarm), advice::alarm(alarm))?;
+            writeln!(Results, "\n  alarm {}: {}", advice::name(alarm), advice::alarm(alarm))?;
             match alarm {
                 Alarm::ToolStuck => self.set_end_switch("Clear the alarm, and use the end switch: on, off")?,
                 _ => self.go("Clear the alarm")?,
@@ -219,9 +219,9 @@ impl Guide {
         if differing.is_empty() || !self.path.exists() || self.state.done.is_empty() {
             return Ok(());
         }
-        say!("The board does not have the settings of {}:", self.path.display())?;
+        writeln!(Results, "The board does not have the settings of {}:", self.path.display())?;
         for &setting in &differing {
-            say!("  {} is {}, and was {}", name(setting), on_board.get(setting), kept.get(setting))?;
+            writeln!(Results, "  {} is {}, and was {}", name(setting), on_board.get(setting), kept.get(setting))?;
         }
         self.go("Go on with the board's settings")?;
         for step in steps() {
@@ -235,32 +235,40 @@ impl Guide {
     /// Prints what is set, what it is expected to weed, what is missing, and what to read next.
     fn summary(&mut self, steps: &[ManualStep]) -> Result<()> {
         let settings = settings::read(&mut self.link)?;
-        say!("\nSummary\n  Set and saved:")?;
+        writeln!(Results, "\nSummary\n  Set and saved:")?;
         for setting in Setting::all().filter(|&setting| settings.get(setting) != setting.default()) {
-            say!("    {} {} {}", name(setting), settings.get(setting), unit(setting))?;
+            writeln!(Results, "    {} {} {}", name(setting), settings.get(setting), unit(setting))?;
         }
         let mut is_open = false;
         for ManualStep { number, title, tasks, .. } in steps {
             let why = self.state.measured.open(tasks, &settings);
             if why.is_some() || !self.state.done.contains(number) {
                 is_open = true;
-                say!("  Open: step {number}, {title}{}", why.map(|why| format!(": {why}")).unwrap_or_default())?;
+                writeln!(
+                    Results,
+                    "  Open: step {number}, {title}{}",
+                    why.map(|why| format!(": {why}")).unwrap_or_default()
+                )?;
             }
         }
         if let Some(warning) = self.state.measured.warning(&settings) {
-            say!("  Warning: {warning}")?;
+            writeln!(Results, "  Warning: {warning}")?;
         }
         let width_mm = self.tool_width_mm().context("the tool's width was not given in step 3");
         let machine = width_mm.and_then(|_| self.machine.map_or_else(|| asked(&self.state), Ok));
         let stroke_ms = self.state.measured.stroke_ms(&settings);
         let expected = machine.and_then(|machine| simulated::expected(&settings, &machine, stroke_ms));
         let if_open = if is_open { ", if the open steps change nothing" } else { "" };
-        say!("  Expected{if_open}: {}", expected.unwrap_or_else(|error| format!("not calculated, because {error:#}")))?;
-        say!("  The measurements are in {}.", self.path.display())?;
+        writeln!(
+            Results,
+            "  Expected{if_open}: {}",
+            expected.unwrap_or_else(|error| format!("not calculated, because {error:#}"))
+        )?;
+        writeln!(Results, "  The measurements are in {}.", self.path.display())?;
         if is_open {
-            return say!("  Next, do the open steps: the same command asks for them.");
+            return writeln!(Results, "  Next, do the open steps: the same command asks for them.");
         }
-        say!("  Next, read docs/work.md (in a release: manual/docs/work.md).")
+        writeln!(Results, "  Next, read docs/work.md (in a release: manual/docs/work.md).")
     }
 
     fn keep(&self) -> Result<()> {
@@ -289,7 +297,7 @@ impl Guide {
                     // Waits a fiftieth of a second for a line of the machine.
                     Err(TryRecvError::Empty) => match self.hear()? {
                         Some((EventLine::Alarm { .. }, _)) => continue 'question,
-                        Some((EventLine::Detection { .. }, line)) if self.watches => say!("\n    {line}")?,
+                        Some((EventLine::Detection { .. }, line)) if self.watches => writeln!(Results, "\n    {line}")?,
                         _ => {}
                     },
                 }
@@ -303,7 +311,7 @@ impl Guide {
             };
             match answer {
                 Ok(answer) => return Ok(answer),
-                Err(right) => tell!("  error: {right}"),
+                Err(right) => writeln!(Messages, "  error: {right}"),
             }
         }
     }
@@ -363,7 +371,9 @@ impl Guide {
         loop {
             let pushed = self.push(&wanted);
             match pushed.as_ref().map_err(Error::downcast_ref) {
-                Err(Some(error @ SettingsError::Contradiction(_))) if !wanted.is_empty() => tell!("  error: {error}"),
+                Err(Some(error @ SettingsError::Contradiction(_))) if !wanted.is_empty() => {
+                    writeln!(Messages, "  error: {error}")
+                }
                 _ => return pushed.map(|()| wanted),
             }
             wanted.retain(|&(setting, _)| setting != Setting::TopSpeedMmS);
@@ -399,7 +409,7 @@ impl Guide {
     fn push(&mut self, wanted: &[(Setting, u16)]) -> Result<()> {
         let set = settings::push(&mut self.link, wanted, &[], true)?;
         for setting in set {
-            say!("  {setting} is set and saved")?;
+            writeln!(Results, "  {setting} is set and saved")?;
         }
         self.state.measured.settings = settings::read(&mut self.link)?;
         Ok(())
@@ -425,7 +435,7 @@ impl Guide {
         match self.link.ask(command) {
             Ok(answer) => Ok(Some(answer)),
             Err(LinkError::Refused { answer, .. }) => {
-                tell!("  {answer}");
+                writeln!(Messages, "  {answer}");
                 self.clear_alarm()?;
                 Ok(None)
             }

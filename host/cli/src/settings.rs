@@ -6,7 +6,7 @@ use clap::{Args, Subcommand};
 use comfy_table::{Table, presets};
 use control::alarm::Alarm;
 use field::conditions::Conditions;
-use frame::{Finding, OutFolder, OutName, Replace, say, source, tell};
+use frame::{Finding, Messages, OutFolder, OutName, Replace, Results, source};
 use link::row_names::Row;
 use link::settings::{self, Setting, SettingsError, Shown, name, unit};
 use link::settings_file::{self, Named};
@@ -99,7 +99,7 @@ fn pull(file: Option<&OutName>, replace: Replace, json: bool, chosen: &Chosen) -
     let pulled = chosen.each(|row, link| {
         let lines = settings::read_lines(link)?;
         if let Some(other) = settings::other_version(link.version(), &lines) {
-            tell!("{}: {other}", row.name);
+            writeln!(Messages, "{}: {other}", row.name);
         }
         let shown = Shown::by(&lines);
         // Another version's status may be unknown.
@@ -114,7 +114,7 @@ fn pull(file: Option<&OutName>, replace: Replace, json: bool, chosen: &Chosen) -
                      `weeder monitor` ends the alarm"
                 );
             }
-            tell!("{}: {LOST}", row.name);
+            writeln!(Messages, "{}: {LOST}", row.name);
         }
         Ok(shown)
     });
@@ -209,12 +209,16 @@ impl Chosen {
         if json {
             let value = |done: &Result<T>| done.as_ref().map_or(Value::Null, &value);
             match done.as_slice() {
-                [only] if !self.are_several => only.as_ref().map_or(Ok(()), |_| say!("{:#}", value(only)))?,
-                all => say!("{:#}", Value::from_iter(self.names().into_iter().zip(all.iter().map(value))))?,
+                [only] if !self.are_several => {
+                    only.as_ref().map_or(Ok(()), |_| writeln!(Results, "{:#}", value(only)))?
+                }
+                all => {
+                    writeln!(Results, "{:#}", Value::from_iter(self.names().into_iter().zip(all.iter().map(value))))?
+                }
             }
         } else {
             for (place, done) in done.iter().enumerate() {
-                done.as_ref().map_or(Ok(()), |done| say!("{}", words(place, done)))?;
+                done.as_ref().map_or(Ok(()), |done| writeln!(Results, "{}", words(place, done)))?;
             }
         }
         self.check(done)

@@ -3,7 +3,7 @@
 use crate::part::{self, Part};
 use anyhow::{Result, ensure};
 use clap::Args;
-use frame::{Finding, OutName, Replace, Show, say, tell, whole_within, with_bar};
+use frame::{Finding, Messages, OutName, Replace, Results, Show, whole_within, with_bar};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use soak::{Plan, SoakError, Subject, Tally};
@@ -139,9 +139,10 @@ fn conclude(study: &Study, stages: &[Stage], json: bool) -> Result<Finding> {
     let is_good = stages.iter().all(|stage| stage.tally.violations.is_empty());
     if json {
         let stages = stages.iter().map(Stage::in_json).collect::<Value>();
-        say!("{:#}", json!({ "seed": seed, "faults_an_hour": faults, "parts": stages }))?;
+        writeln!(Results, "{:#}", json!({ "seed": seed, "faults_an_hour": faults, "parts": stages }))?;
     } else if !is_good {
-        say!(
+        writeln!(
+            Results,
             "To see it again, with the same --elf if one was named: weeder soak --seed {seed} --faults {faults} \
              --hours {hours} --uno-minutes {uno_minutes}"
         )?;
@@ -167,13 +168,13 @@ impl Stage {
         let stage = Self { title, tally: with_bar(title.1, work)? };
         stage.say(json)?;
         let took_s = began.elapsed().as_secs_f64();
-        tell!("Pace        {took_s:.1} s, {:.0} times real time", stage.tally.seconds / took_s);
+        writeln!(Messages, "Pace        {took_s:.1} s, {:.0} times real time", stage.tally.seconds / took_s);
         Ok(stage)
     }
 
     /// Prints its result, unless the output is JSON.
     fn say(&self, json: bool) -> Result<()> {
-        if json { Ok(()) } else { say!("{}\n{}", self.title.1, self.tally) }
+        if json { Ok(()) } else { writeln!(Results, "{}\n{}", self.title.1, self.tally) }
     }
 
     fn in_json(&self) -> Value {

@@ -134,7 +134,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         spacing_cm: arguments.spacing,
         seed: arguments.seed,
     };
-    sweep.warning()?.iter().for_each(|warning| tell!("Warning: {warning}"));
+    sweep.warning()?.iter().for_each(|warning| writeln!(Messages, "Warning: {warning}"));
     if let Some(part) = Part::asked(arguments.shard, out.as_ref(), replace)? {
         let outcomes = with_bar("sweeping", |show| sweep.run_shard(part.shard, show))?;
         return part.write(COMMAND, sweep.size(), &sweep, outcomes);
@@ -153,13 +153,13 @@ pub fn merge(sweep: &Sweep, outcomes: &[PlotOutcome], shown: &Shown) -> Result<(
 
 fn show(sweep: &Sweep, points: &[Point], shown: &Shown, out: Option<OutFile>) -> Result<()> {
     let printed = match shown.json {
-        true => say!("{:#}", in_json(sweep, points)),
-        false => print(format_args!("{}", in_words(shown.result.as_deref().unwrap_or(RESULT), sweep, points))),
+        true => writeln!(Results, "{:#}", in_json(sweep, points)),
+        false => write!(Results, "{}", in_words(shown.result.as_deref().unwrap_or(RESULT), sweep, points)),
     };
     if let Some(out) = out {
         write(&out, sweep, points)?;
         if !shown.json {
-            say!("Written: {}", out.path().display())?;
+            writeln!(Results, "Written: {}", out.path().display())?;
         }
     }
     printed

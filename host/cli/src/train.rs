@@ -111,12 +111,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let training = training::train(&objects, arguments.k, arguments.max)?;
     let fresh = Fresh::of(arguments, &training, &objects)?;
     let printed = match arguments.json {
-        true => say!("{:#}", in_json(&training, &objects, &fresh)),
+        true => writeln!(Results, "{:#}", in_json(&training, &objects, &fresh)),
         false => report(&training, &objects, &fresh),
     };
     tell_k(training.k);
     if let Some(plants) = training.forgotten() {
-        tell!(
+        writeln!(
+            Messages,
             "With the table, {plants} more plants are unknown than with all detections: allow more examples (--max, at most {MOST_EXAMPLES}), or take out weeds with a wrong label"
         );
     }
@@ -138,23 +139,24 @@ impl Arguments {
         }
         let ToLearn { labelled, unlabelled, repeated, contradictions, misread } = table::read_labelled(&self.files)?;
         if unlabelled > 0 {
-            tell!("Passed over {unlabelled} without a label");
+            writeln!(Messages, "Passed over {unlabelled} without a label");
         }
         if repeated > 0 {
-            tell!("Passed over {repeated} that repeat another line");
+            writeln!(Messages, "Passed over {repeated} that repeat another line");
         }
         if let Some(first) = contradictions.first() {
-            tell!("Learned {} with both labels, such as {first}", contradictions.len());
+            writeln!(Messages, "Learned {} with both labels, such as {first}", contradictions.len());
         }
         let count = labelled.len();
         // As many weeds can be unknown to a table that knows its crop.
         if 10 * misread > count {
-            tell!(
+            writeln!(
+                Messages,
                 "The machine classified {misread} of {count} otherwise, so the spacings after them differ from those at work: teach some first, and roll again"
             );
         }
         if count > QUICK {
-            tell!("Learning from {count} detections takes long: half as many take a quarter of the time");
+            writeln!(Messages, "Learning from {count} detections takes long: half as many take a quarter of the time");
         }
         Ok(labelled)
     }
@@ -185,7 +187,8 @@ fn beside(arguments: &Arguments, table: Option<&OutFile>, objects: &[Labelled]) 
     }
     let Beside { chosen, before, after } = training::beside(objects, arguments.k, usize::from(CAPACITY))?;
     let printed = match arguments.json {
-        true => say!(
+        true => writeln!(
+            Results,
             "{:#}",
             json!({
                 "objects": objects.len(),
@@ -194,7 +197,8 @@ fn beside(arguments: &Arguments, table: Option<&OutFile>, objects: &[Labelled]) 
                 "with_these": counts_in_json(&after),
             })
         ),
-        false => say!(
+        false => writeln!(
+            Results,
             "Detections  {}\nExamples    {} chosen\n\nBy the built-in table alone\n\n{before}\n\nBy both together\n\n{after}\n",
             objects.len(),
             chosen.len()
@@ -203,7 +207,7 @@ fn beside(arguments: &Arguments, table: Option<&OutFile>, objects: &[Labelled]) 
     tell_k(arguments.k.unwrap_or(examples::K));
     write_if_asked(table, "Table", arguments.json, |to| Ok(listing::write_csv(&chosen, to)?))?;
     if let Some(table) = table.filter(|_| chosen.is_empty()) {
-        tell!("{} has no example: none improves the built-in table", table.path().display());
+        writeln!(Messages, "{} has no example: none improves the built-in table", table.path().display());
     }
     printed
 }
@@ -212,7 +216,10 @@ fn beside(arguments: &Arguments, table: Option<&OutFile>, objects: &[Labelled]) 
 fn tell_k(k: u8) {
     let default = Setting::K.default();
     if u16::from(k) != default {
-        tell!("These examples are for a k of {k}, and the machine starts with {default}: `set k {k}`, then `save`");
+        writeln!(
+            Messages,
+            "These examples are for a k of {k}, and the machine starts with {default}: `set k {k}`, then `save`"
+        );
     }
 }
 
@@ -265,21 +272,22 @@ impl Display for Fresh {
 
 /// The report of a training.
 fn report(training: &Training, objects: &[Labelled], fresh: &Fresh) -> Result<()> {
-    say!("Detections  {}", objects.len())?;
-    say!("k           {}", training.k)?;
-    say!("Radius      {} (squared distance beyond which a detection is unknown)", training.radius)?;
-    say!("Scale       value that maps onto 0, and onto 255")?;
+    writeln!(Results, "Detections  {}", objects.len())?;
+    writeln!(Results, "k           {}", training.k)?;
+    writeln!(Results, "Radius      {} (squared distance beyond which a detection is unknown)", training.radius)?;
+    writeln!(Results, "Scale       value that maps onto 0, and onto 255")?;
     for (column, range) in table::COLUMNS.iter().zip(training.ranges) {
-        say!("            {column:<13} {:>6} {:>6}", range.lowest, range.highest)?;
+        writeln!(Results, "            {column:<13} {:>6} {:>6}", range.lowest, range.highest)?;
     }
-    say!("Taken out   {} as noise", training.edited_out)?;
-    say!("Examples    {} kept", training.kept.len())?;
-    say!("\nBefore condensing: each detection classified by all others\n\n{}", training.leave_one_out)?;
-    say!(
+    writeln!(Results, "Taken out   {} as noise", training.edited_out)?;
+    writeln!(Results, "Examples    {} kept", training.kept.len())?;
+    writeln!(Results, "\nBefore condensing: each detection classified by all others\n\n{}", training.leave_one_out)?;
+    writeln!(
+        Results,
         "\nAfter condensing: the detections that it was learned from, classified by the table\n\n{}",
         training.by_table
     )?;
-    say!("\n{fresh}\n")
+    writeln!(Results, "\n{fresh}\n")
 }
 
 fn in_json(training: &Training, objects: &[Labelled], fresh: &Fresh) -> Value {

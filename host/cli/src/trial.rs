@@ -11,7 +11,7 @@ use crate::part::{self, Part, Shown};
 use anyhow::{Result, ensure};
 use clap::{Args, Command, FromArgMatches, ValueEnum};
 use field::conditions::{self, presets};
-use frame::{Finding, OutFolder, OutName, Replace, number_within, say, source, tell, whole_within, with_bar};
+use frame::{Finding, Messages, OutFolder, OutName, Replace, Results, number_within, source, whole_within, with_bar};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -245,7 +245,12 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     if !json && !brief {
         let worked_s: f64 = outcomes.iter().map(|outcome| outcome.moved_s).sum();
         let took_s = began.elapsed().as_secs_f64();
-        tell!("Pace: {:.1} h of work in {took_s:.1} s, {:.0} times real time.", worked_s / 3600.0, worked_s / took_s);
+        writeln!(
+            Messages,
+            "Pace: {:.1} h of work in {took_s:.1} s, {:.0} times real time.",
+            worked_s / 3600.0,
+            worked_s / took_s
+        );
     }
     show(&study, &outcomes, &shown, folder.as_ref(), || picture_of(&study.experiment, &engine))
 }
@@ -276,13 +281,17 @@ fn show(
     let totals = experiment::totals(outcomes);
     let summary = summary(&study.experiment, &totals);
     let printed = if json {
-        say!("{:#}", json!({ "summary": summary, "plots": outcomes.iter().map(in_json).collect::<Vec<_>>() }))
+        writeln!(
+            Results,
+            "{:#}",
+            json!({ "summary": summary, "plots": outcomes.iter().map(in_json).collect::<Vec<_>>() })
+        )
     } else if brief {
-        say!("{}\n{}", by_speed(&totals, Brief), about(study))
+        writeln!(Results, "{}\n{}", by_speed(&totals, Brief), about(study))
     } else {
         let [plants, ground] = [Plants, Ground].map(|contents| by_speed(&totals, contents));
         let (budget, about, summary) = (loss_budget(&totals), about(study), summary.join("\n"));
-        say!("{plants}\n{ground}\n\n{LOSS_BUDGET}\n{budget}\n{about}\n\n{summary}")
+        writeln!(Results, "{plants}\n{ground}\n\n{LOSS_BUDGET}\n{budget}\n{about}\n\n{summary}")
     };
     let alarms: u32 = of(&totals, ControllerKind::Firmware).map(|total| total.plots.alarms).sum();
     let damaged: u32 = of(&totals, ControllerKind::Firmware).map(|total| total.plots.effect.injured_of_seen().0).sum();
@@ -291,7 +300,7 @@ fn show(
         let analysis = Analysis::of(experiment::records(outcomes, ControllerKind::Firmware))?;
         write_report(folder, study, picture()?, outcomes, &totals, &analysis, summary)?;
         if !json {
-            say!("\nWritten: report.html, trial.csv and controllers.csv in {}", folder.path().display())?;
+            writeln!(Results, "\nWritten: report.html, trial.csv and controllers.csv in {}", folder.path().display())?;
         }
     }
     printed?;

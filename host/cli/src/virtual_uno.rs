@@ -7,7 +7,7 @@ use anyhow::{Result, anyhow, ensure};
 use clap::Args;
 use field::machine::Machine;
 use field::motion::mm_s;
-use frame::{CourseArguments, number_within, say, tell, whole_within};
+use frame::{CourseArguments, Messages, Results, number_within, whole_within};
 use gps::simulated::{ReceiverSetup, SimulatedReceiver, Trouble};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -128,13 +128,17 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     ensure!(!arguments.roll || count == 1, "--roll is for one row: leave out --rows");
     if arguments.roll {
         let Machine { wheel_mm, beam_to_tool_mm, second_beam_mm, tool_width_mm, .. } = conditions.machine(0);
-        tell!(
+        writeln!(
+            Messages,
             "By tape: wheel {wheel_mm} mm, from the beam to the tool {beam_to_tool_mm} mm and to the second beam \
              {second_beam_mm} mm, tool {tool_width_mm} mm wide. An end switch is on D5."
         );
-        tell!("Here Enter rolls along the row once, and a number rolls that many millimetres over bare ground.");
+        writeln!(
+            Messages,
+            "Here Enter rolls along the row once, and a number rolls that many millimetres over bare ground."
+        );
     } else if !arguments.stand {
-        tell!("The machine rolls {:.0} mm each time.", courses[0].rolls_mm());
+        writeln!(Messages, "The machine rolls {:.0} mm each time.", courses[0].rolls_mm());
     }
     let elf = match (&arguments.elf, &bootloader) {
         (Some(elf), _) => Some(elf.clone()),
@@ -167,18 +171,18 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     };
     let mut unos = LiveRows::start(courses.into_iter().enumerate().map(setup).collect())?;
     for path in unos.paths() {
-        say!("{}", path.display())?;
+        writeln!(Results, "{}", path.display())?;
     }
     let ports = if count == 1 { "Uno's port stands" } else { "Unos' ports stand" };
-    tell!("The virtual {ports} above: 115200 baud. Ctrl-C ends it.");
+    writeln!(Messages, "The virtual {ports} above: 115200 baud. Ctrl-C ends it.");
     let bootloader_alone = bootloader.as_ref().filter(|_| arguments.elf.is_none());
-    tell!("Next, in another terminal: {}", next_command(&unos.paths(), bootloader_alone)?);
+    writeln!(Messages, "Next, in another terminal: {}", next_command(&unos.paths(), bootloader_alone)?);
     let ran = unos.run(&stop, arguments.seconds.map(Duration::from_secs)).map_err(|(row, error)| match count {
         1 => anyhow!(error),
         _ => anyhow!(error).context(format!("row {}", row + 1)),
     })?;
     if arguments.seconds.is_some() {
-        say!("{}", cost(ran, count))?;
+        writeln!(Results, "{}", cost(ran, count))?;
     }
     Ok(())
 }
@@ -198,7 +202,9 @@ fn typed_runs() -> Receiver<Run> {
             match run.map(|run| asked.send(run)) {
                 Some(Ok(())) => {}
                 Some(Err(_)) => return,
-                None => tell!("error: type Enter, or millimetres from {} to {}", RUN_MM.start(), RUN_MM.end()),
+                None => {
+                    writeln!(Messages, "error: type Enter, or millimetres from {} to {}", RUN_MM.start(), RUN_MM.end())
+                }
             }
         }
     });

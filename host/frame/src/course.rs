@@ -1,6 +1,6 @@
 //! Arguments that several commands share: the row, and the machine that rolls along it.
 
-use crate::{number_within, source, tell, whole_within};
+use crate::{Messages, number_within, source, whole_within};
 use anyhow::{Result, ensure};
 use clap::Args;
 use field::conditions::{self, Conditions};
@@ -102,7 +102,8 @@ impl CourseArguments {
         if set(&mut conditions).is_err() {
             conditions.set("machine.second_beam_mm", 0.0)?;
             set(&mut conditions)?;
-            tell!(
+            writeln!(
+                Messages,
                 "Warning: with --beam-to-tool {beam_to_tool_mm}, the firmware cannot use this field's second beam. \
                  The simulated machine has one beam."
             );

@@ -9,7 +9,7 @@
 //! So no command replaces a file without [`Replace`], the option `--force`. A test in `main.rs` checks every argument
 //! that names an output. `--force` does not allow an output that is also another file of its command: [`check`].
 
-use crate::say;
+use crate::Results;
 use anyhow::{Context, Result, bail, ensure};
 use clap::{ArgMatches, Args};
 use field::conditions::Conditions;
@@ -197,7 +197,7 @@ pub fn write_if_asked(
 ) -> Result<()> {
     let Some(file) = file else { return Ok(()) };
     file.write(contents)?;
-    if json { Ok(()) } else { say!("{title:<12}{}", file.path().display()) }
+    if json { Ok(()) } else { writeln!(Results, "{title:<12}{}", file.path().display()) }
 }
 
 fn cannot_be_written(path: &Path) -> String {

@@ -3,7 +3,7 @@
 //! It is a crate of its own so that `cargo sim` compiles no other command: the program `weeder-sim` has [`row`] alone. The crate
 //! `weeder-cli` has it beside all others.
 
-// Results are printed by one function, which handles a closed pipe and a full disk.
+// `Results` prints all results, and handles a closed pipe and a full disk.
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
 mod course;
@@ -18,6 +18,6 @@ pub mod source;
 pub use course::CourseArguments;
 pub use destination::{OutFile, OutFolder, OutName, Replace, write_if_asked};
 pub use numbers::{number_within, whole_within};
-pub use output::{Printed, command_line, print, print_to, printing_aside, tell_line, teller};
+pub use output::{Messages, Printed, Results, command_line, printing_aside, teller};
 pub use program::Finding;
 pub use progress::{Show, with_bar};

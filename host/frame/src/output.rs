@@ -22,47 +22,45 @@ use std::thread;
 /// Most messages of a [`teller`] that wait to be printed.
 const WAITING: usize = 64;
 
-/// Prints a line of a result. Takes the arguments of `println!`, and returns the result of [`print()`](crate::print()).
-#[macro_export]
-macro_rules! say {
-    ($($words:tt)*) => { $crate::print(format_args!("{}\n", format_args!($($words)*))) };
+/// Standard output, for a command's result: `writeln!(Results, "...")?`.
+#[derive(Clone, Copy, Debug)]
+pub struct Results;
+
+impl Results {
+    /// Prints a part of the result, unchanged: for `write!` and `writeln!`.
+    ///
+    /// # Errors
+    /// Any error of standard output, except a pipe that its reader has closed.
+    pub fn write_fmt(self, text: Arguments) -> Result<()> {
+        print_to(&mut io::stdout().lock(), text)
+    }
 }
 
-/// Prints a message. Takes the arguments of `eprintln!`.
-#[macro_export]
-macro_rules! tell {
-    ($($words:tt)*) => { $crate::tell_line(format_args!($($words)*)) };
+/// Standard error, for messages beside the result: `writeln!(Messages, "...")`.
+#[derive(Clone, Copy, Debug)]
+pub struct Messages;
+
+impl Messages {
+    /// Prints a line: for `writeln!`.
+    pub fn write_fmt(self, line: Arguments) {
+        let line = line.to_string();
+        // Standard error is closed: there is no other place for the message.
+        let _ = writeln!(io::stderr(), "{}", in_a_line(line.trim_end_matches('\n')));
+    }
 }
 
-/// Prints a part of the result, unchanged.
-///
-/// # Errors
-/// Any error of standard output, except a pipe that its reader has closed.
-pub fn print(text: Arguments) -> Result<()> {
-    print_to(&mut io::stdout().lock(), text)
-}
-
-/// As [`print()`], to this output.
-///
-/// # Errors
-/// As [`print()`].
-pub fn print_to(output: &mut impl Write, text: Arguments) -> Result<()> {
+/// As [`Results`], to this output.
+fn print_to(output: &mut impl Write, text: Arguments) -> Result<()> {
     match output.write_fmt(text).and_then(|()| output.flush()) {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
         written => written.context("the result cannot be printed"),
     }
 }
 
-/// Prints a message, for [`tell!`].
-pub fn tell_line(line: Arguments) {
-    // Standard error is closed: there is no other place for the message.
-    let _ = writeln!(io::stderr(), "{}", in_a_line(&line.to_string()));
-}
-
-/// A function that prints messages as [`tell!`] does, in a thread of its own: it never waits. Messages that find 64
+/// A function that prints messages as [`Messages`] does, in a thread of its own: it never waits. Messages that find 64
 /// others waiting are dropped. Their number is printed once the output takes messages again.
 pub fn teller() -> impl Fn(&str) + Send + Sync + 'static {
-    teller_by(|line| tell_line(format_args!("{line}")))
+    teller_by(|line| writeln!(Messages, "{line}"))
 }
 
 /// The same, with a function that prints.
@@ -91,7 +89,7 @@ fn teller_by(print: impl Fn(&str) + Send + 'static) -> impl Fn(&str) + Send + Sy
 pub enum Printed {
     /// A line of the result.
     Result(String),
-    /// A message, as by [`tell!`].
+    /// A message, as by [`Messages`].
     Message(String),
 }
 
@@ -99,7 +97,7 @@ pub enum Printed {
 /// printed, in their order, before this returns.
 ///
 /// # Errors
-/// The work's error. If a line of the result cannot be printed, as by [`print()`]: this error is printed at once, and the
+/// The work's error. If a line of the result cannot be printed, as by [`Results`]: this error is printed at once, and the
 /// rest of the result is dropped.
 pub fn printing_aside<T>(
     output: &mut (impl Write + Send),
@@ -120,10 +118,10 @@ fn print_all(waiting: Receiver<Printed>, output: &mut impl Write) -> bool {
     let mut is_printed = true;
     for line in waiting {
         match line {
-            Printed::Message(line) => tell!("{line}"),
+            Printed::Message(line) => writeln!(Messages, "{line}"),
             Printed::Result(line) if is_printed => {
                 if let Err(error) = print_to(output, format_args!("{line}\n")) {
-                    tell!("error: {error:#}");
+                    writeln!(Messages, "error: {error:#}");
                     is_printed = false;
                 }
             }

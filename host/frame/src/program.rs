@@ -1,7 +1,7 @@
 //! The frame of the programs `weeder` and `weeder-sim`: they parse their words, run a command, and exit with a status.
 
 use crate::numbers::with_negative_numbers;
-use crate::{destination, tell};
+use crate::{Messages, destination};
 use anyhow::Result;
 use clap::builder::StyledStr;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
@@ -39,7 +39,7 @@ pub fn main<A: Parser>(run: impl FnOnce(A) -> Result<Finding>) -> ExitCode {
         Ok(Finding::Good) => ExitCode::SUCCESS,
         Ok(Finding::Bad) => ExitCode::from(1),
         Err(error) => {
-            tell!("error: {error:#}");
+            writeln!(Messages, "error: {error:#}");
             ExitCode::from(2)
         }
     }

@@ -1,7 +1,7 @@
 //! `weeder sim`: the real firmware on a virtual Uno, on a simulated row or on a recording of a real encoder.
 
 use crate::{
-    CourseArguments, Finding, OutFile, OutFolder, OutName, Replace, print, say, source, with_bar, write_if_asked,
+    CourseArguments, Finding, OutFile, OutFolder, OutName, Replace, Results, source, with_bar, write_if_asked,
 };
 use anyhow::Result;
 use clap::Args;
@@ -104,24 +104,24 @@ fn weed(arguments: &Arguments, row: Row, folder: Option<&OutFolder>, vcd: Option
     if !arguments.json {
         let manner = if arguments.paper { ", swings as in the paper" } else { "" };
         let introduction = report::introduction(&pass);
-        say!("{introduction} at {} km/h{manner}", course.speed)?;
-        say!("Field {}, {}", in_a_line(arguments.field()), course.origin())?;
+        writeln!(Results, "{introduction} at {} km/h{manner}", course.speed)?;
+        writeln!(Results, "Field {}, {}", in_a_line(arguments.field()), course.origin())?;
     }
     let outcome = with_bar("weeding", |show| uno_run::run(&pass, &elf, show))?;
 
     let totals = report::totals(&pass, &conditions, &outcome);
     let printed = if arguments.json {
-        say!("{:#}", in_json(arguments, &pass, &outcome))
+        writeln!(Results, "{:#}", in_json(arguments, &pass, &outcome))
     } else if arguments.totals {
-        print(format_args!("{totals}"))
+        write!(Results, "{totals}")
     } else {
-        print(format_args!("{}\n\n{totals}", report::table(&outcome)))
+        write!(Results, "{}\n\n{totals}", report::table(&outcome))
     };
     if let Some(folder) = folder {
         write_folder(folder, &pass, &outcome, mm_s(arguments.course.speed))?;
         if !arguments.json {
             let [files @ .., last] = REPORT;
-            say!("Written     {} and {last} in {}", files.join(", "), folder.path().display())?;
+            writeln!(Results, "Written     {} and {last} in {}", files.join(", "), folder.path().display())?;
         }
     }
     write_waveform(arguments, vcd, &outcome.changes)?;
@@ -177,10 +177,13 @@ fn play(arguments: &Arguments, capture: &[PinChange], vcd: Option<&OutFile>) -> 
     let printed = if arguments.json {
         let mut json = json!(counted);
         json["edges"] = edges.into();
-        say!("{json:#}")
+        writeln!(Results, "{json:#}")
     } else {
-        say!("Edges       {edges} in the recording")?;
-        say!("Counted     net {net_ticks}, lowest {lowest_ticks}, highest {highest_ticks}; {lost_ticks} lost")
+        writeln!(Results, "Edges       {edges} in the recording")?;
+        writeln!(
+            Results,
+            "Counted     net {net_ticks}, lowest {lowest_ticks}, highest {highest_ticks}; {lost_ticks} lost"
+        )
     };
     write_waveform(arguments, vcd, &changes)?;
     printed?;

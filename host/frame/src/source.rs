@@ -1,7 +1,7 @@
 //! Input files of commands: `-` is standard input. Some words are known names instead of files, and a shell's
 //! completion offers them.
 
-use crate::tell;
+use crate::Messages;
 use clap::builder::{OsStringValueParser, PossibleValue, TypedValueParser};
 use clap::{Arg, Command};
 use field::conditions::{Conditions, presets};
@@ -36,7 +36,7 @@ pub fn field(preset_or_file: &str) -> Result<Conditions, FileError> {
 
 /// Prints what is likely wrong with these conditions.
 pub fn warn(conditions: &Conditions) {
-    conditions.warning().iter().for_each(|warning| tell!("Warning: {warning}"));
+    conditions.warning().iter().for_each(|warning| writeln!(Messages, "Warning: {warning}"));
 }
 
 /// A value that `parser` reads. A shell's completion offers these names, but other words are also accepted.

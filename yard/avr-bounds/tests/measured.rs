@@ -45,8 +45,8 @@ struct Measured {
     critical_section_cycles: u64,
 }
 
-/// A call of simavr's for the interrupt lines of a part of the chip (sim_io.h).
-fn lines_of(part: [u8; 3], name: u8) -> u32 {
+/// simavr's name for a call to a part of the chip (sim_io.h).
+fn call_to(part: [u8; 3], name: u8) -> u32 {
     u32::from_be_bytes([part[0], part[1], part[2], name])
 }
 
@@ -68,6 +68,10 @@ fn measure(program: &Program, seed: u64) -> Measured {
         std::ptr::copy_nonoverlapping(program.flash.as_ptr(), (*avr).flash, program.flash.len());
         (*avr).codeend = chip.flash_bytes;
         (*avr).pc = program.start;
+        // simavr would pause in real time for each turn of a program that waits for a byte.
+        for uart in *b"01" {
+            simavr_ffi::avr_ioctl(avr, call_to(*b"uas", uart), std::ptr::from_ref(&0_u32).cast_mut().cast());
+        }
         let stack_pointer = |avr: *mut simavr_ffi::avr_t| {
             usize::from(*(*avr).data.add(SPL)) | usize::from(*(*avr).data.add(SPL + 1)) << 8
         };
@@ -142,10 +146,10 @@ fn measure(program: &Program, seed: u64) -> Measured {
 /// `avr` is a chip that was initialised.
 unsafe fn drive(avr: *mut simavr_ffi::avr_t, random: &mut impl Rng) {
     let (part, line, value) = match random.random_range(0..4) {
-        0 => (lines_of(*b"uar", b"01"[random.random_range(0..2)]), 0, random.random_range(0..256)),
-        1 => (lines_of(*b"adc", 0), random.random_range(0..8), random.random_range(0..5000)),
+        0 => (call_to(*b"uar", b"01"[random.random_range(0..2)]), 0, random.random_range(0..256)),
+        1 => (call_to(*b"adc", 0), random.random_range(0..8), random.random_range(0..5000)),
         _ => (
-            lines_of(*b"iog", b"ABCDE"[random.random_range(0..5)]),
+            call_to(*b"iog", b"ABCDE"[random.random_range(0..5)]),
             random.random_range(0..8),
             random.random_range(0..2),
         ),

@@ -3,7 +3,7 @@
 use super::state::State;
 use super::{Guide, yes_or_no};
 use anyhow::Result;
-use frame::{say, tell};
+use frame::{Messages, Results};
 use link::settings::{self, Setting};
 use mechanics::design::Design;
 use mechanics::machine::{Input, Machine};
@@ -52,12 +52,12 @@ impl Guide {
         let swing = match Swing::fitted(&machine, torque, &settings::read(&mut self.link)?) {
             Ok(swing) => swing,
             Err(problem) => {
-                tell!("  The tool cannot swing as it has to: {problem}.");
+                writeln!(Messages, "  The tool cannot swing as it has to: {problem}.");
                 return Ok(Vec::new());
             }
         };
         for sentence in swing.sentences(&machine, torque) {
-            say!("  {sentence}")?;
+            writeln!(Results, "  {sentence}")?;
         }
         let setting = |(name, value): (&str, u32)| Some((Setting::find(name.as_bytes())?, u16::try_from(value).ok()?));
         Ok(swing.settings().into_iter().filter_map(setting).collect())

@@ -2,7 +2,7 @@
 
 use super::{End, Guide, yes_or_no};
 use anyhow::{Error, Result, bail};
-use frame::{say, tell};
+use frame::{Messages, Results};
 use link::settings::{self, Setting, name, range};
 use link::{EventLine, Mode, Status};
 use set_up::{SEE_TO_SERVO, SetUp, Step};
@@ -52,19 +52,19 @@ impl Guide {
                 let leads: Vec<(Setting, u16)> = leads.collect();
                 return self.push(&leads);
             };
-            say!("  Next, {step}")?;
+            writeln!(Results, "  Next, {step}")?;
             self.go("Stop the machine where no plant is within the tool's reach. Keep clear of the tool")?;
             let from = self.stands_at(None)?;
             if self.ask("calibrate servo")?.is_none() {
                 continue;
             }
             if io::stdin().is_terminal() {
-                say!("  The tool swings six times. Enter ends that at once.")?;
+                writeln!(Results, "  The tool swings six times. Enter ends that at once.")?;
             }
             let Some((event, line)) = self.swings(from)? else { continue };
             match event {
                 EventLine::NotCalibrated {} => {
-                    tell!("  error: the end switch did not follow: see to it, or type off");
+                    writeln!(Messages, "  error: the end switch did not follow: see to it, or type off");
                     // A switch that never closes has an alarm in a third of a second, which asks the same.
                     thread::sleep(Duration::from_millis(500));
                     match settings::status(&mut self.link)?.alarm {
@@ -73,7 +73,10 @@ impl Guide {
                     }
                 }
                 EventLine::CalibratedBySwitch { out_ms, in_ms, is_set } => {
-                    say!("  The tool was out after {out_ms} ms, and began to come back after {in_ms} ms.")?;
+                    writeln!(
+                        Results,
+                        "  The tool was out after {out_ms} ms, and began to come back after {in_ms} ms."
+                    )?;
                     if !Setting::LeadOutMs.allows(out_ms) || !Setting::LeadInMs.allows(in_ms) {
                         bail!(
                             "the firmware takes leads of up to {} ms: take a faster servo or valve, or a shorter stroke",
@@ -157,9 +160,12 @@ impl Guide {
         }
         let has_moved = has_moved || settings::status(&mut self.link)?.position != from;
         if has_moved {
-            tell!("  The wheel moved, so the machine has dropped the measurement. Hold the machine still.");
+            writeln!(
+                Messages,
+                "  The wheel moved, so the machine has dropped the measurement. Hold the machine still."
+            );
         } else {
-            tell!("  The machine has not reported the swings within {} seconds.", SWINGS.as_secs());
+            writeln!(Messages, "  The machine has not reported the swings within {} seconds.", SWINGS.as_secs());
         }
         Ok(None)
     }
@@ -169,7 +175,7 @@ impl Guide {
         let typed = self.obey_typed();
         if !matches!(typed, Ok(false)) {
             self.link.ask("hold")?;
-            say!("  The swings are ended, and the tool is out.")?;
+            writeln!(Results, "  The swings are ended, and the tool is out.")?;
         }
         typed
     }
@@ -190,7 +196,8 @@ impl Guide {
             if since.elapsed() > PATIENCE {
                 if !std::mem::replace(&mut is_told, true) {
                     let wanted = if has_rolled { "stand still" } else { "roll farther" };
-                    tell!(
+                    writeln!(
+                        Messages,
                         "  The machine has to {wanted}: pos={position} speed_mm_s={speed_mm_s}. If that is wrong, see to the \
                          encoder. s leaves the step out, q stops."
                     );
@@ -224,7 +231,7 @@ impl Guide {
             if stretches >= SetUp::STRETCHES {
                 return self.push(&[]);
             }
-            say!("  Stretch {} of {}", stretches + 1, SetUp::STRETCHES)?;
+            writeln!(Results, "  Stretch {} of {}", stretches + 1, SetUp::STRETCHES)?;
             self.go("Stand at the first mark, and stand still")?;
             let from = self.stands_at(None)?;
             if self.ask("calibrate start")?.is_none() {
@@ -238,7 +245,7 @@ impl Guide {
                     continue 'stretches;
                 }
                 if let Some(warning) = backward(from, self.stands_at(Some(from))?) {
-                    tell!("  Warning: {warning}");
+                    writeln!(Messages, "  Warning: {warning}");
                 }
                 let command = format!("calibrate {length}");
                 if let Some(answer) = self.ask(&command)? {
@@ -247,7 +254,7 @@ impl Guide {
             };
             self.state.measured.take_line(&format!("> {command}"));
             answer.iter().for_each(|line| self.state.measured.take_line(line));
-            answer.iter().try_for_each(|line| say!("  {line}"))?;
+            answer.iter().try_for_each(|line| writeln!(Results, "  {line}"))?;
             self.push(&[])?;
             self.keep()?;
         }
@@ -258,25 +265,25 @@ impl Guide {
         self.push(&[])?;
         let settings = settings::read(&mut self.link)?;
         if matches!(self.state.measured.missing(&settings)[..], [Step::PassPlants(_)]) {
-            say!("  Roll past plants: both beams measure the slip.")?;
+            writeln!(Results, "  Roll past plants: both beams measure the slip.")?;
         }
         loop {
             match self.state.measured.margin(&settings) {
                 Ok(margin) => {
                     let least_mm = margin.least_mm();
-                    say!("  The measurements ask for {least_mm} mm: {margin}")?;
+                    writeln!(Results, "  The measurements ask for {least_mm} mm: {margin}")?;
                     let value = self.value(Setting::MarginMm, Some(least_mm))?;
                     self.state.measured.take_line(&format!("> set {} {value}", name(Setting::MarginMm)));
                     self.push(&[(Setting::MarginMm, value)])?;
                     if let Some(warning) = self.state.measured.warning(&settings::read(&mut self.link)?) {
-                        tell!("  Warning: {warning}");
+                        writeln!(Messages, "  Warning: {warning}");
                     }
                     return Ok(());
                 }
                 Err(missing) => {
                     let [Step::PassPlants(_)] = missing[..] else {
                         for step in &missing {
-                            say!("  Missing: {step}")?;
+                            writeln!(Results, "  Missing: {step}")?;
                         }
                         // A slip of the finger, for example.
                         if let [Step::MeasureAgain(_, SEE_TO_SERVO)] = missing[..]
@@ -288,7 +295,7 @@ impl Guide {
                         {
                             self.state.measured.forget_timings();
                         }
-                        return say!("  The margin stays at {} mm.", settings.get(Setting::MarginMm));
+                        return writeln!(Results, "  The margin stays at {} mm.", settings.get(Setting::MarginMm));
                     };
                     self.pass_plant()?;
                 }
@@ -302,12 +309,12 @@ impl Guide {
         while Instant::now() < deadline {
             self.obey_typed()?;
             if let Some((EventLine::Slip { permille }, line)) = self.hear()? {
-                say!("  slip {permille} permille")?;
+                writeln!(Results, "  slip {permille} permille")?;
                 self.state.measured.take_line(&line);
                 return self.keep();
             }
         }
-        tell!("  No plant has passed both beams for {} minutes.", PLANTS.as_secs() / 60);
+        writeln!(Messages, "  No plant has passed both beams for {} minutes.", PLANTS.as_secs() / 60);
         Err(Error::msg(End::LeaveOut))
     }
 }

@@ -1,7 +1,7 @@
 //! The file of a set-up: its board, completed steps, measurements, and the board's settings as they were last.
 
 use anyhow::{Result, bail};
-use frame::tell;
+use frame::Messages;
 use link::row_names::Board;
 use link::settings::{Setting, name};
 use mechanics::machine::{Input, Machine};
@@ -87,7 +87,7 @@ impl State {
             );
         }
         if !self.board.is_empty() && self.board != named {
-            tell!("{} was made for a board at {}. This one is at {named}.", path.display(), self.board);
+            writeln!(Messages, "{} was made for a board at {}. This one is at {named}.", path.display(), self.board);
         }
         self.board = named;
         Ok(())

@@ -3,6 +3,7 @@
 //! Each file has one subject. All are modules of one test program, so that it is linked once. Tests that wait for a
 //! machine leave the cores to those that compute.
 
+mod a_whole_set_up;
 mod any_file;
 mod bad_input;
 mod common;

@@ -12,8 +12,6 @@ use std::fs::{self, File};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
-use std::thread;
-use std::time::Duration;
 use study::experiment::{ControllerKind, Engine, Experiment, Total, totals};
 use tempfile::TempDir;
 use uno::pty::Pty;
@@ -23,7 +21,7 @@ use uno_run::by_the_manual::Novice;
 const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/set-up.md");
 
 /// Selects the random fields and measurements.
-const SEED: u64 = 1;
+pub(crate) const SEED: u64 = 1;
 
 /// The machine from the box in the default field.
 fn the_box() -> Conditions {
@@ -31,7 +29,7 @@ fn the_box() -> Conditions {
 }
 
 /// The firmware at 2.5 km/h in the field of a seed.
-fn weeded(conditions: &Conditions, replications: u32, seed: u64) -> Total {
+pub(crate) fn weeded(conditions: &Conditions, replications: u32, seed: u64) -> Total {
     let experiment = Experiment {
         speeds_km_h: vec![2.5],
         replications,
@@ -176,7 +174,7 @@ fn the_steps_in_their_order_end_at_the_machine_that_is_set_up() {
 }
 
 /// The simulated machine, as on the page.
-fn machine_of_the_page() -> String {
+pub(crate) fn machine_of_the_page() -> String {
     let page = fs::read_to_string(PAGE).expect("it is there");
     page.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).expect("it has a machine").to_owned()
 }
@@ -219,7 +217,7 @@ fn a_file_that_is_another_s_is_not_written_over() {
 }
 
 /// Ends a process with the test.
-struct Ends(Child);
+pub(crate) struct Ends(Child);
 
 impl Drop for Ends {
     fn drop(&mut self) {
@@ -239,14 +237,14 @@ fn start(folder: &Path, words: &[&str]) -> (Ends, ChildStdin, BufReader<ChildStd
 }
 
 /// Starts a virtual Uno, and waits for its port.
-fn uno(folder: &Path, words: &[&str]) -> (Ends, ChildStdin) {
+pub(crate) fn uno(folder: &Path, words: &[&str]) -> (Ends, ChildStdin) {
     let (uno, input, mut output) = start(folder, &[&["virtual-uno"], words].concat());
     output.read_line(&mut String::new()).expect("it prints its port");
     (uno, input)
 }
 
 /// Runs `weeder set-up` to its end. `act` gets each line and each question, and the user's keyboard. Returns the output.
-fn lead(folder: &Path, words: &[&str], mut act: impl FnMut(&str, &mut ChildStdin)) -> String {
+pub(crate) fn lead(folder: &Path, words: &[&str], mut act: impl FnMut(&str, &mut ChildStdin)) -> String {
     let (mut guide, mut keyboard, output) = start(folder, &[&["set-up"], words].concat());
     let (mut said, mut line) = (String::new(), Vec::new());
     for byte in output.bytes() {
@@ -261,95 +259,8 @@ fn lead(folder: &Path, words: &[&str], mut act: impl FnMut(&str, &mut ChildStdin
     said
 }
 
-fn type_to(keyboard: &mut ChildStdin, line: impl std::fmt::Display) {
+pub(crate) fn type_to(keyboard: &mut ChildStdin, line: impl std::fmt::Display) {
     writeln!(keyboard, "{line}").expect("it reads");
-}
-
-#[test]
-fn a_person_sets_the_virtual_uno_up_from_the_first_question_to_the_last() {
-    let folder = TempDir::new().expect("there is room for a folder");
-    fs::write(folder.path().join("my.toml"), machine_of_the_page()).expect("there is room for a file");
-    // Fast, for a test.
-    let (_uno, mut machine) = uno(folder.path(), &["--roll", "--link", "uno", "--speed", "5"]);
-    let words = ["--port", "./uno", "--machine", "my.toml"];
-    let (mut detections, mut timings, mut disturbed) = (0, 0, false);
-    let mut act = |text: &str, keyboard: &mut ChildStdin| {
-        if text.contains("votes=") {
-            detections += 1;
-            // The lines come while the question waits.
-            if detections == 12 {
-                type_to(keyboard, "");
-            }
-        } else if text.contains("Roll past plants: both beams") {
-            (0..2).for_each(|_| type_to(&mut machine, ""));
-        } else if text.contains("The lines come here") {
-            type_to(&mut machine, "");
-        } else if text.contains("second_beam_mm in mm") {
-            type_to(keyboard, "200");
-        } else if text.contains("Roll to the other mark") {
-            type_to(&mut machine, "10000");
-            type_to(keyboard, "");
-        } else if text.contains("An end switch on D5") {
-            type_to(keyboard, "on");
-        } else if text.contains("Keep clear of the tool [go on]") {
-            timings += 1;
-            type_to(keyboard, "");
-            if timings == 1 {
-                // The swings have begun by then, and have not ended.
-                thread::sleep(Duration::from_secs(4));
-                type_to(&mut machine, "1000");
-                disturbed = true;
-            }
-        } else if text.ends_with("]: ") {
-            type_to(keyboard, "");
-        }
-    };
-    // Stopped at the fifth step, and continued.
-    let first = lead(folder.path(), &words, |text, keyboard| match text.contains("servo_in_us in us") {
-        true => type_to(keyboard, "q"),
-        false => act(text, keyboard),
-    });
-    assert!(first.ends_with("Stopped. The same command continues here.\n"), "{first}");
-    let second = lead(folder.path(), &words, &mut act);
-    assert!(disturbed && timings == 3, "{timings} timings: {second}");
-    for words in [
-        "Step 4 of 8, Fit a second beam: done",
-        "servo_out_us in us, now 2000 [1750]",
-        "The measurements ask for ",
-        " + blade 10 + ",
-        "    stem_zone_mm 110 mm\n",
-        "Next, read docs/work.md",
-    ] {
-        assert!(second.contains(words), "{words:?} is not in\n{second}");
-    }
-    assert!(!second.contains("Open: ") && !second.contains("Warning"), "{second}");
-    // The summary expects what the field `walked` weeds.
-    let expected = second.split("Expected: ").nth(1).and_then(|rest| rest.split(' ').next()).expect("it is printed");
-    let walked = Conditions::preset("walked").expect("there is one").expect("it is right");
-    let weeded = 100.0 * weeded(&walked, 10, SEED).plots.weeded_share;
-    assert!((expected.parse::<f64>().expect("it is a number") - weeded).abs() < 2.0, "{expected}, not {weeded:.1}");
-
-    let json: serde_json::Value =
-        serde_json::from_str(&said(folder.path(), &["settings", "pull", "--port", "./uno", "--json"])).expect("JSON");
-    let value = |setting: Setting| json[name(setting)].as_u64().expect("it is a number");
-    // 1909.86 counts a metre, and 5 % of slip: 2010.4. 50 to 80 ms of dead time, and up to 56 ms for the stroke.
-    assert!((2005..=2016).contains(&value(Setting::TicksPerM)), "{json:#}");
-    assert!((95..=155).contains(&value(Setting::LeadOutMs)), "{json:#}");
-    assert!((60..=100).contains(&value(Setting::LeadInMs)), "{json:#}");
-    // The 22 mm of the simulated machine, other measurements, and half of a blade of 20 mm.
-    assert!((30..=40).contains(&value(Setting::MarginMm)), "{json:#}");
-
-    // A second board is empty, and the file is not its own.
-    let (_other, _) = uno(folder.path(), &["--stand", "--link", "other"]);
-    let third = lead(folder.path(), &["--port", "./other"], |text, keyboard| {
-        if text.ends_with("]: ") {
-            let goes_on = text.contains("Go on with the board's") || text.contains("clear the alarm");
-            type_to(keyboard, if goes_on { "" } else { "q" });
-        }
-    });
-    assert!(third.contains("servo_out_us is 2000, and was 1750"), "{third}");
-    assert!(third.contains("Step 3 of 8, Fit a wider tool: done"), "{third}");
-    assert!(!third.contains("Fit a second beam: done") && !third.contains("Keep the stem: done"), "{third}");
 }
 
 #[test]
