@@ -7,9 +7,9 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use comfy_table::{ContentArrangement, Table, presets};
 use field::conditions::{self, Conditions, PARAMETERS};
 use frame::{
-    OutFile, OutName, Replace, number_within, print, say,
+    Messages, OutFile, OutName, Replace, Results, number_within,
     source::{self, offering},
-    tell, whole_within, with_bar,
+    whole_within, with_bar,
 };
 use link::settings::{self, Setting};
 use serde_json::{Map, Value, json};

@@ -7,9 +7,9 @@ use clap::{ArgGroup, Args};
 use control::{ground::examples, settings::Setting};
 use field::row::Kind;
 use frame::{
-    OutFile, OutName, Replace, say,
+    Messages, OutFile, OutName, Replace, Results,
     source::{self, offering},
-    tell, whole_within, write_if_asked,
+    whole_within, write_if_asked,
 };
 use link::examples::CAPACITY;
 use serde_json::{Value, json};
