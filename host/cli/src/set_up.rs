@@ -4,11 +4,13 @@
 //! a set-up can be continued. The steps come from the manual's page, and the margin from [`set_up`], as in the
 //! monitor and on the page.
 
+mod changes;
 mod machine;
 mod measuring;
 mod simulated;
 mod state;
 
+use self::changes::Changes;
 use self::machine::{asked, take_arm};
 use self::state::State;
 use crate::input::{self, Line};
@@ -17,7 +19,7 @@ use anyhow::{Context, Error, Result, ensure};
 use clap::Args;
 use control::alarm::Alarm;
 use files::{bounded_file, whole_file};
-use frame::{Messages, Results, source};
+use frame::{Messages, Results, source, whole_within};
 use link::row_names::Board;
 use link::settings::{self, Setting, SettingsError, allowed_top_speed, name, range, unit};
 use link::{ConsoleLine, EventLine, Link, LinkError, Mode, Status, advice};
@@ -52,10 +54,16 @@ pub struct Arguments {
     /// Start again at the first step, and forget the measurements.
     #[arg(long)]
     again: bool,
+    /// Do this step again: after another servo or arm, 6; after another wheel, 7.
+    #[arg(long, value_name = "N", value_parser = whole_within(1..=steps().len()), conflicts_with = "again")]
+    step: Option<usize>,
     /// Do the steps on the simulated machine, and print what each of them brings.
-    #[arg(long, conflicts_with_all = ["port", "state", "machine", "again"])]
+    #[arg(long, conflicts_with_all = ["port", "state", "machine", "again", "step"])]
     simulated: bool,
 }
+
+/// More damaged plants than this, percent, are too many: a machine that was set up by the steps damages far fewer.
+const MOST_DAMAGED_PERCENT: f64 = 0.5;
 
 /// Leads through the steps.
 pub fn run(arguments: &Arguments) -> Result<()> {
@@ -72,16 +80,15 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let mut state = if arguments.again { State::default() } else { kept_state };
     whole_file::check(path).with_context(|| format!("{} cannot be written", path.display()))?;
     let machine = arguments.machine.as_deref().map(mechanics::file::read).transpose()?;
-    if let Some(machine) = &machine {
-        state.take_machine(machine);
-    }
+    let measures = machine.as_ref().map(|machine| state.take_machine(machine)).unwrap_or_default();
     let known = machine.map_or_else(|| asked(&state), Ok)?;
     take_arm(&mut state.measured, &known);
     let board = Board::at(&arguments.port.board()?.port()?)?;
-    state.take_board(&board, path)?;
+    let changes = Changes { other_board: state.take_board(&board), measures, step: arguments.step };
     let link = board.open()?;
     let stop = crate::ctrl_c()?;
-    match (Guide { link, state, machine, typed: input::typed(), path: path.clone(), watches: false, stop }).lead() {
+    let guide = Guide { link, state, machine, typed: input::typed(), path: path.clone(), watches: false, stop };
+    match guide.lead(changes) {
         Err(error) if error.is::<End>() => writeln!(Results, "Stopped. The same command continues here."),
         ended => ended,
     }
@@ -121,10 +128,10 @@ struct Guide {
 }
 
 impl Guide {
-    fn lead(mut self) -> Result<()> {
+    fn lead(mut self, changes: Changes) -> Result<()> {
         writeln!(Results, "Enter takes what stands in [brackets], s leaves a step out, q stops.")?;
         self.link.ask("events on")?;
-        self.compare()?;
+        self.compare(changes)?;
         let steps = steps();
         let count = steps.len();
         for step in &steps {
@@ -188,8 +195,10 @@ impl Guide {
         if alarm == Alarm::SettingsLost {
             writeln!(Results, "The board has no saved settings: alarm 5-1 settings_lost. If a file has them, type q.")?;
             writeln!(Results, "Then `weeder settings push FILE.toml` restores them.")?;
-            self.go("Save its present settings, and clear the alarm")?;
-            self.link.ask("save")?;
+            if !self.restore()? {
+                self.go("Save its present settings, and clear the alarm")?;
+                self.link.ask("save")?;
+            }
         } else {
             writeln!(Results, "\n  alarm {}: {}", advice::name(alarm), advice::alarm(alarm))?;
             match alarm {
@@ -204,32 +213,6 @@ impl Guide {
     /// Why a step is open: the board's settings or the measurements show it.
     fn open(&mut self, tasks: &[Task]) -> Result<Option<String>> {
         Ok(self.state.measured.open(tasks, &settings::read(&mut self.link)?))
-    }
-
-    /// Compares the board's settings with those of the file. Steps whose settings differ are open again.
-    fn compare(&mut self) -> Result<()> {
-        // An alarm's question may set and read a setting.
-        let kept = self.state.measured.settings.clone();
-        self.clear_alarm()?;
-        let on_board = settings::read(&mut self.link)?;
-        self.state.measured.settings.clone_from(&on_board);
-        // The end switch may be the answer to an alarm just now.
-        let differs = |&setting: &Setting| setting != Setting::EndSwitch && on_board.get(setting) != kept.get(setting);
-        let differing: Vec<Setting> = Setting::all().filter(differs).collect();
-        if differing.is_empty() || !self.path.exists() || self.state.done.is_empty() {
-            return Ok(());
-        }
-        writeln!(Results, "The board does not have the settings of {}:", self.path.display())?;
-        for &setting in &differing {
-            writeln!(Results, "  {} is {}, and was {}", name(setting), on_board.get(setting), kept.get(setting))?;
-        }
-        self.go("Go on with the board's settings")?;
-        for step in steps() {
-            if step.tasks.iter().any(|task| matches!(task, Task::Set(setting, _) if differing.contains(setting))) {
-                self.state.done.remove(&step.number);
-            }
-        }
-        self.keep()
     }
 
     /// Prints what is set, what it is expected to weed, what is missing, and what to read next.
@@ -251,7 +234,7 @@ impl Guide {
                 )?;
             }
         }
-        if let Some(warning) = self.state.measured.warning(&settings) {
+        if let Some(warning) = self.state.measured.margin_warning(&settings) {
             writeln!(Results, "  Warning: {warning}")?;
         }
         let width_mm = self.tool_width_mm().context("the tool's width was not given in step 3");
@@ -259,11 +242,14 @@ impl Guide {
         let stroke_ms = self.state.measured.stroke_ms(&settings);
         let expected = machine.and_then(|machine| simulated::expected(&settings, &machine, stroke_ms));
         let if_open = if is_open { ", if the open steps change nothing" } else { "" };
-        writeln!(
-            Results,
-            "  Expected{if_open}: {}",
-            expected.unwrap_or_else(|error| format!("not calculated, because {error:#}"))
-        )?;
+        let said = match &expected {
+            Ok((said, _)) => said.clone(),
+            Err(error) => format!("not calculated, because {error:#}"),
+        };
+        writeln!(Results, "  Expected{if_open}: {said}")?;
+        if expected.is_ok_and(|(_, damaged_percent)| damaged_percent > MOST_DAMAGED_PERCENT) {
+            writeln!(Results, "  Warning: it damages too many plants. Do not weed before the steps are done.")?;
+        }
         writeln!(Results, "  The measurements are in {}.", self.path.display())?;
         if is_open {
             return writeln!(Results, "  Next, do the open steps: the same command asks for them.");

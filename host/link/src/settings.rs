@@ -99,6 +99,24 @@ pub fn allowed_top_speed(settings: &Settings) -> Result<u16, Contradiction> {
     }
 }
 
+/// The speed up to which a tool with a second beam works, in mm/s: at a higher one it stays out, because a plant that only
+/// this beam sees would reach it too soon. `None` without a second beam.
+pub fn working_speed(settings: &Settings) -> Option<u16> {
+    let [beam_to_tool_mm, second_beam_mm, margin_mm, zone_mm, lead_out_ms, response_ms] = [
+        Setting::BeamToToolMm,
+        Setting::SecondBeamMm,
+        Setting::MarginMm,
+        Setting::StemZoneMm,
+        Setting::LeadOutMs,
+        Setting::BeamResponseMs,
+    ]
+    .map(|setting| u32::from(settings.get(setting)));
+    // As in the firmware's contradiction of a beam that is too near.
+    let room_mm = beam_to_tool_mm.saturating_sub(second_beam_mm.max(margin_mm + zone_mm / 2) + 1);
+    let mm_s = 1000 * room_mm / (lead_out_ms + lead_out_ms / 8 + response_ms + 1);
+    (second_beam_mm > 0).then_some(mm_s as u16)
+}
+
 /// Reads all settings in use.
 ///
 /// # Errors
@@ -301,6 +319,8 @@ pub struct Foreign {
 
 /// Sets some settings, leaves the others unchanged, and reads all back. `save` saves them. Returns the changed settings.
 ///
+/// Another wheel has no calibration unless `wanted` has another one than the board: `ticks_per_m` becomes 0.
+///
 /// Sends nothing if the result would contradict itself, or if the machine is at work. Settings that only the machine's
 /// version has, or whose values only it has, are sent as they are, and the machine checks them.
 ///
@@ -340,8 +360,8 @@ pub fn push(
             changed.push((foreign.name.clone(), format!("set {} {value}", foreign.name)));
         }
     }
-    let wants_calibration = wanted.iter().any(|&(setting, _)| setting == Setting::TicksPerM);
-    if !wants_calibration && !shown.missing.contains(&Setting::TicksPerM) {
+    // The board's own calibration is of the wheel before, also where a pulled file of that wheel has it.
+    if after.get(Setting::TicksPerM) == before.get(Setting::TicksPerM) && !shown.missing.contains(&Setting::TicksPerM) {
         follow_wheel(before, &mut after);
     }
     let is_beyond = |(setting, own): &&(Setting, RangeInclusive<u16>)| !own.contains(&after.get(*setting));

@@ -8,6 +8,7 @@ use crate::unit::{
     self, CM, COUNT, DEGREE, FACTOR, HECTARE_PER_HOUR, HP, KG_CM, KM_H, KPA, M, MM, MPA, NEWTON, NEWTON_METRE, RPM,
     WATT,
 };
+use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
 use uom::si::f64::{Force, Length, Ratio, Torque};
 
@@ -131,12 +132,17 @@ impl Design {
             fine(format!("{depth_words}: the servo bears that too"))
         };
 
-        let width = machine.inter_row.width;
+        // Half of the sweeps run between the machine's row and the next one.
+        let beside = machine.inter_row.tools.div_ceil(2);
+        let width = f64::from(beside) * machine.inter_row.width;
+        let sweeps = format!("{beside} of the sweeps, {} side by side,", written(width, MM));
         let sweep_sense = if width > self.sweep_width {
-            concern(format!("the sweeps' {} break soil in the protection zone", written(width, MM)))
+            concern(format!("{sweeps} break soil in a protection zone"))
         } else {
-            let left = written(self.sweep_width - width, MM);
-            fine(format!("the sweeps' {} keep off the crop, and leave {left} of it unused", written(width, MM)))
+            fine(format!(
+                "{sweeps} keep off the crop, and leave {} of it unused",
+                written(self.sweep_width - width, MM)
+            ))
         };
         let apex = machine.inter_row.apex_angle;
         let apex_sense = if apex > self.apex_angle {
@@ -161,7 +167,7 @@ impl Design {
             servo_torque: "servo torque", "above Eq. 10", KG_CM => servo_sense;
             failure_zone: "soil failure zone", "Eq. 11", MM
                 => fine(format!("{rows} between rows, less the protection zones"));
-            sweep_width: "widest sweep", "Eq. 12", MM => sweep_sense;
+            sweep_width: "room for sweeps between rows", "Eq. 12", MM => sweep_sense;
             apex_angle: "bluntest apex angle", "Eq. 13", DEGREE => apex_sense;
             tools: "tools that fit", "above Eq. 13", COUNT => fit_sense;
             tool_draft: "draft of one tool", "Eq. 14", NEWTON
@@ -181,7 +187,8 @@ impl Design {
             match ratio {
                 ..=1.0 => fine(format!("the shank's {given} bear {stress}, {share} of the allowed stress")),
                 _ => concern(format!(
-                    "the shank's {given} would bear {stress}, {ratio:.1} times the allowed stress: it bends"
+                    "the shank's {given} would bear {stress}, {} times the allowed stress: it bends",
+                    digits(ratio)
                 )),
             }
         };
@@ -201,7 +208,9 @@ impl Design {
         let speed = written(self.ground_speed, KM_H);
         let miss = f64::from(self.ground_speed / machine.weeder.speed) - 1.0;
         let teeth = self.driven_teeth.round() as u32;
-        let teeth_sense = if teeth < *GOOD_TEETH.start() {
+        let teeth_sense = if machine.chain.drive_teeth < *GOOD_TEETH.start() {
+            concern(format!("the drive sprocket's {} teeth are too few for a chain", machine.chain.drive_teeth))
+        } else if teeth < *GOOD_TEETH.start() {
             concern(format!("{teeth} teeth are too few for a chain: take a smaller gear box ratio"))
         } else if teeth > *GOOD_TEETH.end() {
             concern(format!("{teeth} teeth are too many for a chain: take a larger gear box ratio"))
@@ -213,6 +222,13 @@ impl Design {
         let turn_s = digits(60.0 / RPM.value(self.wheel_speed));
         let shaft = written(self.gear_box_speed, RPM);
         let links = digits(self.exact_chain_links);
+        // The sprockets' radii, and half a pitch for the teeth of each.
+        let clear = machine.chain.pitch * (f64::from(machine.chain.drive_teeth + teeth) / TAU + 1.0);
+        let chain_sense = if self.centre_distance < clear {
+            concern(format!("the sprockets need shafts {} apart: take more pitches of distance", written(clear, MM)))
+        } else {
+            fine(format!("{links} links, rounded up to an even number"))
+        };
         let spare = (f64::from(self.chain_links) - self.exact_chain_links) / 2.0 * machine.chain.pitch;
         let (taut, longer) = (written(self.centre_distance + spare, MM), written(spare, MM));
         figures! { self;
@@ -220,8 +236,7 @@ impl Design {
             chain_reduction: "reduction by the chain", "below Eq. 17", FACTOR
                 => fine(format!("from the {shaft} of the gear box's shaft"));
             driven_teeth: "driven sprocket", "below Eq. 17", FACTOR => teeth_sense;
-            chain_links: "chain links", "Eq. 18", COUNT
-                => fine(format!("{links} links, rounded up to an even number"));
+            chain_links: "chain links", "Eq. 18", COUNT => chain_sense;
             chain_length: "chain length", "Eq. 19", MM
                 => fine(format!("taut with the shafts {taut} apart: {longer} more than planned"));
         }

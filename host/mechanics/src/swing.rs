@@ -25,9 +25,9 @@ mod sentences;
 use crate::arm::{SwungArm, turn_ms};
 use crate::machine::{Machine, SwingInputs};
 use crate::unit::{KG_CM, MM};
-use link::settings::{Setting, Settings, allowed_top_speed, explain, name};
+use link::settings::{Setting, Settings, allowed_top_speed, explain, name, working_speed};
 use serde::Serialize;
-use set_up::{circle, saved_ms};
+use set_up::{circle, saved_ms, stems_mm};
 use uom::si::f64::{Time, Torque};
 use uom::si::time::second;
 
@@ -45,6 +45,9 @@ const BESIDE_ZONE_MM: f64 = 1.0;
 
 /// Half of a blade's length along the row, mm, for which the default margin is enough: that of the paper's blade of 45 mm.
 const BLADE_IN_DEFAULT_MM: f64 = 23.0;
+
+/// What stems may need beyond the stem zone, mm, for which the default margin is enough: as in the field `walked`.
+const STEMS_IN_DEFAULT_MM: f64 = 10.0;
 
 /// Pulses are whole steps of this, us, rounded outwards.
 const PULSE_STEP_US: f64 = 5.0;
@@ -77,6 +80,10 @@ pub struct Swing {
     pub top_speed_mm_s: Option<u32>,
     /// The top speed with these settings, mm/s: the lower one, or the board's.
     pub highest_mm_s: u32,
+    /// With a second beam, the speed up to which the tool works, mm/s. `None` if that is the top speed, or without one.
+    pub working_mm_s: Option<u32>,
+    /// Distance from beam to tool for which these speeds hold, mm.
+    pub beam_to_tool_mm: u32,
     /// Lead of the command to leave the row, ms.
     pub lead_out_ms: u32,
     /// Lead of the command to come back, ms.
@@ -87,7 +94,9 @@ pub struct Swing {
     pub blade_mm: f64,
     /// How much wider than the default the margin has to be for a long blade, mm; 0 if the default is enough.
     pub blade_margin_mm: u32,
-    /// The margin that arm and blade need, mm. `None` if the default is enough, or if the board's is as wide.
+    /// The same for stems that stand far off the middle of their canopies, mm.
+    pub stem_margin_mm: u32,
+    /// The margin that arm, blade and stems need, mm. `None` if the default is enough, or if the board's is as wide.
     pub margin_mm: Option<u32>,
     /// Height by which a pendulum lifts the blade's middle over the stroke, mm; 0 for a trailing arm.
     pub lift_mm: f64,
@@ -190,9 +199,11 @@ impl Swing {
         let arm_margin_mm = if is_pendulum { 0.0 } else { carried_mm.ceil() };
         let blade_mm = MM.value(machine.intra_row.blade_base) / 2.0;
         let blade_margin_mm = (blade_mm - BLADE_IN_DEFAULT_MM).max(0.0).ceil();
-        // The board's margin may be measured, and then it has the parts of arm and blade.
+        let stems_mm = if stem_zone_mm > 0.0 { stems_mm(MM.value(inputs.stem_off)) } else { 0.0 };
+        let stem_margin_mm = (stems_mm - STEMS_IN_DEFAULT_MM).max(0.0).ceil();
+        // The board's margin may be measured, and then it has these parts.
         let board_mm = f64::from(settings.get(Setting::MarginMm));
-        let wider_mm = arm_margin_mm + blade_margin_mm;
+        let wider_mm = arm_margin_mm + blade_margin_mm + stem_margin_mm;
         let wide_mm = if wider_mm > 0.0 { f64::from(Setting::MarginMm.default()) + wider_mm } else { 0.0 };
         let wide_advice = if blade_margin_mm > arm_margin_mm {
             "take a blade that is shorter along the row"
@@ -231,11 +242,14 @@ impl Swing {
             clear_height_mm: of_pendulum(clear_mm.max(0.0).floor()),
             top_speed_mm_s: (allowed_mm_s < board_mm_s).then_some(allowed_mm_s.into()),
             highest_mm_s: allowed_mm_s.into(),
+            working_mm_s: working_speed(&after).filter(|&mm_s| mm_s < allowed_mm_s).map(u32::from),
+            beam_to_tool_mm: after.get(Setting::BeamToToolMm).into(),
             lead_out_ms: lead_out_ms as u32,
             lead_in_ms: lead_in_ms as u32,
             arm_margin_mm: arm_margin_mm as u32,
             blade_mm,
             blade_margin_mm: blade_margin_mm as u32,
+            stem_margin_mm: stem_margin_mm as u32,
             margin_mm: (wide_mm > board_mm).then_some(wide_mm as u32),
             lift_mm: of_pendulum(stroke_mm),
             edge_lift_mm: of_pendulum(edge_mm),

@@ -56,15 +56,20 @@ fn a_wheel_is_safe_or_fails() {
 fn a_shank_bends_or_bears_its_load() {
     let shank =
         |mm: f64| figure_with("inter_row_shank_diameter", |machine| machine.inter_row.shank_diameter = MM.of(mm));
-    assert_sense(&shank(16.0), true, "427 MPa, 7.6 times the allowed stress: it bends");
+    assert_sense(&shank(16.0), true, "427 MPa, 7.626 times the allowed stress: it bends");
     assert_sense(&shank(32.0), false, "95 % of the allowed stress");
 }
 
 #[test]
 fn sweeps_are_too_wide_or_too_blunt_or_right() {
     let width = |mm: f64| figure_with("sweep_width", |machine| machine.inter_row.width = MM.of(mm));
-    assert_sense(&width(80.0), false, "leave 91.13 mm of it unused");
-    assert_sense(&width(180.0), true, "break soil in the protection zone");
+    // Two run between the machine's row and the next one.
+    assert_sense(&width(80.0), false, "2 of the sweeps, 160 mm side by side, keep off the crop, and leave 11.13 mm");
+    assert_sense(&width(86.0), true, "172 mm side by side, break soil in a protection zone");
+    let one_a_side = figure_with("sweep_width", |machine| {
+        (machine.inter_row.tools, machine.inter_row.width) = (2, MM.of(170.0));
+    });
+    assert_sense(&one_a_side, false, "1 of the sweeps, 170 mm side by side, keep off the crop");
     let apex = |degrees: f64| figure_with("apex_angle", |machine| machine.inter_row.apex_angle = DEGREE.of(degrees));
     assert_sense(&apex(120.0), true, "right for a friction of 30 degrees");
     assert_sense(&apex(80.0), false, "weeds slide along");
@@ -106,6 +111,17 @@ fn a_sprocket_has_too_few_or_too_many_teeth_or_misses_the_speed() {
     assert_sense(&teeth(300.0), true, "5 teeth are too few for a chain: take a smaller gear box ratio");
     assert_sense(&teeth(10.0), true, "152 teeth are too many for a chain: take a larger gear box ratio");
     assert_sense(&teeth(160.0), false, "10 teeth give 2.375 km/h");
+    let drive = figure_with("driven_teeth", |machine| machine.chain.drive_teeth = 8);
+    assert_sense(&drive, true, "the drive sprocket's 8 teeth are too few");
+    // 61 teeth: radii of 2.2 and 9.7 pitches, and half a pitch for the teeth of each.
+    let shafts = |pitches: f64| {
+        figure_with("chain_links", |machine| {
+            machine.engine.gear_box_ratio = FACTOR.of(25.0);
+            machine.chain.centre_distance_pitches = FACTOR.of(pitches);
+        })
+    };
+    assert_sense(&shafts(13.0), true, "the sprockets need shafts 164.3 mm apart: take more pitches");
+    assert_sense(&shafts(13.2), false, "rounded up to an even number");
     let off = figure_with("driven_teeth", |machine| {
         machine.engine.gear_box_ratio = FACTOR.of(160.0);
         machine.weeder.speed = KM_H.of(2.51);

@@ -61,10 +61,19 @@ const FIRMWARE_MM: f64 = 5.0;
 /// Beside a stem zone the margin is calculated for this speed, 1 km/h.
 const SLOW_M_S: f64 = 1.0 / 3.6;
 
-/// How far a stem's protected ground may reach beyond its zone, as a share of the zone. In the field `walked` it is 10 of
-/// 110 mm at most: a zone of 90 mm round a stem that stands 20 mm off the middle of its canopy. So few stems do that this
-/// share keeps the damage below 1 plant in 10,000.
-const STEM_SHARE: f64 = 0.088;
+/// How far a stem's protected ground may reach beyond its zone, as a share of the stem's distance from the middle of its
+/// canopy. The zone has that distance once, half on each side, so it is a half at most. Few stems stand so far off that
+/// this share keeps the damage below 1 plant in 10,000.
+const STEM_REACH: f64 = 0.484;
+
+/// The least of these distances that is assumed, as a share of the zone: 20 of 110 mm in the field `walked`.
+const STEM_OFF: f64 = 2.0 / 11.0;
+
+/// How far the protected ground of stems that stand up to this far off their canopies' middle, mm, reaches beyond the
+/// zone, mm: as much as the margin has to cover.
+pub fn stems_mm(stem_off_mm: f64) -> f64 {
+    STEM_REACH * stem_off_mm
+}
 
 /// What to do if the servo's times need too great a margin.
 pub const SEE_TO_SERVO: &str = "see to the servo, its times differ too much";
@@ -78,6 +87,8 @@ pub struct SetUp {
     sets_margin: bool,
     /// The width of a tool on a trailing arm, mm. `None` for a pendulum.
     pub trailing_tool_mm: Option<u16>,
+    /// How far a stem may stand off the middle of its canopy, mm; 0 if it is not known.
+    pub stem_off_mm: f64,
     /// The arm, which swings the tool aside.
     pub arm: Arm,
     /// The settings in use, as far as the session shows them.
@@ -302,7 +313,7 @@ impl SetUp {
             slip_mm,
             servo_mm: f64::from(scatter_ms) * speed_m_s,
             firmware_mm: FIRMWARE_MM * speed_m_s / SPEED_M_S,
-            stems_mm: keeps_stems(settings).then_some(STEM_SHARE * zone_mm),
+            stems_mm: keeps_stems(settings).then_some(stems_mm(self.stem_off_mm.max(STEM_OFF * zone_mm))),
             arm_mm,
             blade_mm,
             in_use_mm: settings.get(Setting::MarginMm),
@@ -361,9 +372,11 @@ impl SetUp {
 
     /// A warning if this session has set a margin that does not cover the measured values.
     pub fn warning(&self, settings: &Settings) -> Option<String> {
-        if !self.sets_margin {
-            return None;
-        }
+        self.sets_margin.then(|| self.margin_warning(settings)).flatten()
+    }
+
+    /// A warning if the margin does not cover the measured values, also if another session has set it.
+    pub fn margin_warning(&self, settings: &Settings) -> Option<String> {
         let in_use_mm = settings.get(Setting::MarginMm);
         let safe_mm = Setting::MarginMm.default();
         match self.margin(settings) {

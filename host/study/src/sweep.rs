@@ -75,14 +75,13 @@ pub const RESULTS: [&str; 8] = [
 ];
 
 fn results(outcome: &PlotOutcome, rows: u32) -> [f64; RESULTS.len()] {
-    let performance = outcome.record.performance();
     // From all weeds: the scatter of a square metre would hide the effect.
-    let weeding = outcome.effect.in_plot.efficiency_percent();
+    let performance = outcome.record.performance_with(outcome.effect.in_plot.efficiency_percent());
     // A plot without a plant or a weed has no such figure.
     let known = |measure: Option<f64>| measure.unwrap_or(f64::NAN);
     [
         known(performance.plant_damage_percent),
-        known(weeding),
+        known(performance.weeding_efficiency_percent),
         100.0 * outcome.weeded_share,
         100.0 * outcome.weedable_share,
         known(performance.field_efficiency_percent),
@@ -245,6 +244,17 @@ mod tests {
             speed_km_h: 2.5,
             spacing_cm: 50.0,
             seed: 1,
+        }
+    }
+
+    #[test]
+    fn the_index_follows_from_the_other_results_of_its_point() {
+        for point in sweep("lead_out_ms=0..300:150", Some("plot.counted_m2=0..2:1")).run(|_| ()).unwrap() {
+            let [damage, weeding, .., field_efficiency, index, _, _] = point.results;
+            // Eq. 24, 25 and 27, for 2.5 km/h on 0.4 m with 2.5 hp.
+            let capacity = field_efficiency / 100.0 * 2.5 * 0.4 / 10.0;
+            let expected = capacity * (100.0 - damage) * weeding / 2.5;
+            assert!((index - expected).abs() < 1e-6 * expected, "{index}, not {expected}");
         }
     }
 

@@ -86,7 +86,8 @@ impl Novice {
                 for permille in self.pass_plants()? {
                     self.measured.take_line(&format!("slip permille={permille}"));
                 }
-                let machine = &self.conditions.machine;
+                let (machine, crop) = (&self.conditions.machine, &self.conditions.crop);
+                self.measured.stem_off_mm = crop.stem_off_mm + crop.sway_mm;
                 self.measured.arm.blade_length_mm = machine.tool_length_mm;
                 self.measured.trailing_tool_mm =
                     (machine.arm == Arm::Trailing).then_some(machine.tool_width_mm.ceil() as u16);

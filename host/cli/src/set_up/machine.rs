@@ -109,10 +109,11 @@ pub(super) fn asked(state: &State) -> Result<Machine> {
     Ok(mechanics::file::parse(Path::new("the machine"), &text)?)
 }
 
-/// Calculates leads and margin with a machine's arm and blade.
+/// Calculates leads and margin with a machine's arm and blade, and where its stems stand.
 pub(super) fn take_arm(measured: &mut SetUp, machine: &Machine) {
     let tool_mm = MM.value(machine.intra_row.width).ceil() as u16;
     measured.trailing_tool_mm = (machine.swing.arm_trails > 0).then_some(tool_mm);
+    measured.stem_off_mm = MM.value(machine.swing.stem_off);
     let length_mm = MM.value(machine.intra_row.shank_length);
     let ms_for_90 = 1500.0 * SECOND.value(machine.swing.servo_time_60);
     let blade_length_mm = MM.value(machine.intra_row.blade_base);

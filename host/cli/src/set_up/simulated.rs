@@ -76,9 +76,9 @@ fn weeded(conditions: &Conditions, speed_km_h: f64) -> Result<Vec<Total>> {
 }
 
 /// What this machine is expected to weed with these settings. Its stroke takes the measured time, `stroke_ms`, or else the
-/// calculated one, with the arm's mass. Wheel, ground and straying are those of the field, and it has no sweeps. Fails if
-/// the simulated machine cannot have these values.
-pub fn expected(settings: &Settings, machine: &Machine, stroke_ms: Option<f64>) -> Result<String> {
+/// calculated one, with the arm's mass. Wheel, ground and straying are those of the field, and it has no sweeps. In words,
+/// and the plants damaged of those that the beam sees, percent. Fails if the simulated machine cannot have these values.
+pub fn expected(settings: &Settings, machine: &Machine, stroke_ms: Option<f64>) -> Result<(String, f64)> {
     let Machine { intra_row, swing, .. } = machine;
     let mut conditions = Conditions::load(conditions::DEFAULT)?.from_the_box();
     // A calibrated wheel: 2010 ticks a metre with this field's slip.
@@ -130,14 +130,15 @@ pub fn expected(settings: &Settings, machine: &Machine, stroke_ms: Option<f64>) 
     let speed_km_h = SPEED_KM_H.min((10.0 * allowed_km_h).floor() / 10.0);
     let totals = weeded(&conditions, speed_km_h)?;
     let total = totals.first().context("no row was weeded")?;
-    Ok(format!(
+    let said = format!(
         "{:.1} % of the row's ground weeded, and {} % of the plants that the beam sees damaged, in the simulated \
          field {} at {speed_km_h} km/h, with a tool of {tool_width_mm:.0} mm and no \
          sweeps",
         100.0 * total.plots.weeded_share,
         total.damage_of_seen().shown(),
         conditions::DEFAULT,
-    ))
+    );
+    Ok((said, total.damage_of_seen().percent().unwrap_or(0.0)))
 }
 
 #[cfg(test)]
@@ -165,7 +166,7 @@ mod tests {
         ] {
             let text = format!("{LIGHT}intra_row.width = \"{width_mm} mm\"\n{own}");
             let machine = mechanics::file::parse(Path::new("my.toml"), &text).expect("it is right");
-            let expected = expected(&rig::settings(&settings), &machine, None).expect("it can be simulated");
+            let (expected, _) = expected(&rig::settings(&settings), &machine, None).expect("it can be simulated");
             let percent = expected.split_once("and ").and_then(|(_, damage)| damage.split(' ').next());
             let percent: f64 = percent.and_then(|percent| percent.parse().ok()).expect("the damage is a number");
             // At most 1 plant of 2,000.
@@ -191,7 +192,7 @@ mod tests {
                  swing.protected = \"90 mm\"\nswing.stem_off = \"20 mm\"\n"
             );
             let machine = mechanics::file::parse(Path::new("my.toml"), &text).expect("it is right");
-            let expected = expected(&settings, &machine, stroke_ms).expect("it can be simulated");
+            let (expected, _) = expected(&settings, &machine, stroke_ms).expect("it can be simulated");
             !expected.contains("and 0.0 % of the plants")
         };
         assert!(!has_damage(2.0, 1.0, None));
@@ -208,7 +209,7 @@ mod tests {
         let slow = [(Setting::TopSpeedMmS, 620), (Setting::LeadOutMs, 461), (Setting::LeadInMs, 50)];
         let settings = rig::settings(&[&pulse_and_zone[..], &slow].concat());
         assert_eq!(settings.contradiction(), None);
-        let expected = expected(&settings, &machine, None).expect("it can be simulated");
+        let (expected, _) = expected(&settings, &machine, None).expect("it can be simulated");
         assert!(expected.contains(" at 1.6 km/h") && !expected.starts_with("0.0 %"), "{expected}");
     }
 }

@@ -1,13 +1,11 @@
 //! The file of a set-up: its board, completed steps, measurements, and the board's settings as they were last.
 
 use anyhow::{Result, bail};
-use frame::Messages;
 use link::row_names::Board;
 use link::settings::{Setting, name};
 use mechanics::machine::{Input, Machine};
 use set_up::SetUp;
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
 
 /// The completed steps, the measurements, and the user's measures.
 #[derive(Default)]
@@ -30,8 +28,8 @@ const DONE: &str = "done ";
 const ASK: &str = "machine ";
 const GET: &str = "> get";
 
-/// A board with its own number begins so, in words.
-const NUMBER: &str = "serial number ";
+/// The sections of a machine file on which stroke and leads depend.
+const SWUNG: [&str; 2] = ["intra_row", "swing"];
 
 impl State {
     pub(super) fn parse(text: &str) -> Result<Self> {
@@ -64,32 +62,34 @@ impl State {
         lines.join("\n")
     }
 
-    /// Keeps a machine file's measures: a later call may come without the file.
-    pub(super) fn take_machine(&mut self, machine: &Machine) {
-        // Conversions leave a last digit.
-        let measure = |input: Input| (format!("{}.{}", input.section, input.key), (input.value * 1e6).round() / 1e6);
-        self.asked.extend(machine.inputs().into_iter().map(measure));
+    /// Keeps a machine file's measures: a later call may come without the file. Returns those of arm, tool and servo that were
+    /// others, each in a line.
+    pub(super) fn take_machine(&mut self, machine: &Machine) -> Vec<String> {
+        let mut others = Vec::new();
+        for Input { section, key, value, unit, .. } in machine.inputs() {
+            // Conversions leave a last digit.
+            let (name, value) = (format!("{section}.{key}"), (value * 1e6).round() / 1e6);
+            let before = self.asked.insert(name.clone(), value);
+            if let Some(before) = before.filter(|&before| before != value && SWUNG.contains(&section)) {
+                others.push(format!("{name} is {value} {unit}, and was {before}"));
+            }
+        }
+        others
     }
 
-    /// Takes the board that is there. Fails if the file belongs to a board with another serial number.
-    pub(super) fn take_board(&mut self, board: &Board, path: &Path) -> Result<()> {
+    /// Takes the board that is there. Returns the file's board, in words, if that is another.
+    pub(super) fn take_board(&mut self, board: &Board) -> Option<String> {
         let named = match board {
-            Board::SerialNumber(number) => format!("{NUMBER}{number}"),
+            Board::SerialNumber(number) => format!("serial number {number}"),
             Board::Port(port) => format!("port {port}"),
             Board::Only { .. } => String::new(),
         };
-        if [&self.board, &named].iter().all(|words| words.starts_with(NUMBER)) && self.board != named {
-            let path = path.display();
-            bail!(
-                "{path} belongs to the board with {}, and this one has {named}: give another --state, or start \
-                 {path} again with --again",
-                self.board
-            );
-        }
-        if !self.board.is_empty() && self.board != named {
-            writeln!(Messages, "{} was made for a board at {}. This one is at {named}.", path.display(), self.board);
-        }
-        self.board = named;
-        Ok(())
+        let before = std::mem::replace(&mut self.board, named);
+        (!before.is_empty() && before != self.board).then_some(before)
+    }
+
+    /// The board, in words.
+    pub(super) fn board(&self) -> &str {
+        if self.board.is_empty() { "no number" } else { &self.board }
     }
 }

@@ -86,12 +86,18 @@ fn a_person_sets_the_virtual_uno_up_from_the_first_question_to_the_last() {
     // The 22 mm of the simulated machine, other measurements, and half of a blade of 20 mm.
     assert!((30..=40).contains(&value(Setting::MarginMm)), "{json:#}");
 
-    // A second board is empty, and the file is not its own.
+    // A second board is empty, and the file is another's.
     let (_other, _) = uno(folder.path(), &["--stand", "--link", "other"]);
     let third = lead(folder.path(), &["--port", "./other"], |text, keyboard| {
+        let answers = [
+            ("Is it the same machine", "yes"),
+            ("Set the settings of", "no"),
+            ("clear the alarm", ""),
+            ("Go on with the board's", ""),
+        ];
         if text.ends_with("]: ") {
-            let goes_on = text.contains("Go on with the board's") || text.contains("clear the alarm");
-            type_to(keyboard, if goes_on { "" } else { "q" });
+            let answer = answers.iter().find(|(question, _)| text.contains(question));
+            type_to(keyboard, answer.map_or("q", |(_, answer)| answer));
         }
     });
     assert!(third.contains("servo_out_us is 2000, and was 1750"), "{third}");

@@ -1,6 +1,7 @@
 //! The manual's page on setting the machine up: its steps are safe, and lead there.
 
 mod alarms;
+mod changes;
 
 use crate::common::said;
 use crate::typed::{printed, typed};

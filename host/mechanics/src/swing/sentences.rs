@@ -29,7 +29,13 @@ impl Swing {
             ),
         ];
         said.extend(self.top_speed_mm_s.map(|mm_s| {
-            format!("With this lead, the beam is far enough ahead up to {mm_s} mm/s. A beam farther ahead allows more.")
+            format!(
+                "With this lead, a beam {} mm ahead of the tool is far enough up to {mm_s} mm/s. One farther ahead allows more.",
+                self.beam_to_tool_mm
+            )
+        }));
+        said.extend(self.working_mm_s.map(|mm_s| {
+            format!("With the second beam the tool works up to {mm_s} mm/s, and stays out of the row above it.")
         }));
         let speed = machine.weeder.speed;
         let speed_mm_s = KM_H.value(speed) / 0.0036;
@@ -63,6 +69,13 @@ impl Swing {
             2.0 * self.blade_mm,
             self.blade_mm.ceil()
         ));
+        if self.stem_margin_mm > 0 {
+            said.push(format!(
+                "Stems {:.0} mm off the middle of their canopies need {} mm more than the default margin.",
+                MM.value(machine.swing.stem_off),
+                self.stem_margin_mm
+            ));
+        }
         if machine.swing.arm_trails == 0 {
             let most_kg_cm = KG_CM.value(machine.intra_row.servo_torque) / 3.0;
             let remedy = "Take a lighter arm or a stronger servo";

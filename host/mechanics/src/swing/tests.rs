@@ -235,6 +235,19 @@ fn the_stroke_clears_the_circle_also_for_stems_off_the_line() {
 }
 
 #[test]
+fn stems_far_off_the_middle_need_a_wider_margin() {
+    // Half of the distance lies beyond the zone, 10 mm of it are in the default margin.
+    for (stem_off_mm, excess_mm) in [(10.0, 0), (20.0, 0), (40.0, 10), (50.0, 15)] {
+        let mut machine = Machine::default();
+        (machine.swing.protected, machine.swing.stem_off) = (MM.of(90.0), MM.of(stem_off_mm));
+        let swing = Swing::of(&machine, KG_CM.of(10.0)).expect("it swings");
+        assert_eq!((swing.stem_margin_mm, swing.margin_mm), (excess_mm, (excess_mm > 0).then_some(50 + excess_mm)));
+        let said = swing.sentences(&machine, KG_CM.of(10.0)).join(" ");
+        assert_eq!(said.contains(&format!("canopies need {excess_mm} mm more")), excess_mm > 0, "{said}");
+    }
+}
+
+#[test]
 fn a_blade_that_is_long_along_the_row_needs_a_wider_margin() {
     let of = |length_mm: f64, arm_trails: u32| {
         let mut machine = Machine::default();

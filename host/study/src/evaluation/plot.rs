@@ -86,6 +86,11 @@ pub struct Performance {
     pub performance_index: Option<f64>,
 }
 
+/// A part in percent of the whole. `None` if the whole is 0.
+fn percent(part: f64, whole: u32) -> Option<f64> {
+    (whole > 0).then(|| 100.0 * part / f64::from(whole))
+}
+
 impl PlotRecord {
     /// Parses a line of a table. The values are not checked yet.
     pub(super) fn read(line: Line) -> Result<Self, FileError> {
@@ -136,12 +141,14 @@ impl PlotRecord {
 
     /// The plot's measures by Eq. 22 to 27. They are finite if [`PlotRecord::check`] succeeds.
     pub fn performance(&self) -> Performance {
-        let percent = |part: f64, whole: u32| (whole > 0).then(|| 100.0 * part / f64::from(whole));
+        let weeds = self.weeds_before.zip(self.weeds_after);
+        self.performance_with(weeds.and_then(|(before, after)| percent(f64::from(before) - f64::from(after), before)))
+    }
+
+    /// The same, with the weeding efficiency of other weeds, percent.
+    pub fn performance_with(&self, weeding_efficiency_percent: Option<f64>) -> Performance {
         let plant_damage_percent =
             self.damaged.zip(self.plants).and_then(|(damaged, plants)| percent(f64::from(damaged), plants));
-        let weeds = self.weeds_before.zip(self.weeds_after);
-        let weeding_efficiency_percent =
-            weeds.and_then(|(before, after)| percent(f64::from(before) - f64::from(after), before));
         let theoretical_capacity_ha_h = self.width_m.map(|width_m| self.speed_km_h * width_m / 10.0);
         let effective_capacity_ha_h =
             self.area_m2.zip(self.time_s).map(|(area_m2, time_s)| (area_m2 / M2_PER_HA) / (time_s / S_PER_H));
