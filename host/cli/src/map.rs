@@ -5,6 +5,7 @@ use anyhow::Result;
 use clap::Args;
 use comfy_table::{Table, presets};
 use field::counted;
+use files::in_a_line;
 use frame::{Messages, OutName, Replace, Results, number_within, source};
 use gps::summary::{Stand, Summary};
 use gps::wheel::Ratio;
@@ -187,7 +188,7 @@ fn rows(summary: &Summary) -> [(&'static str, String); 22] {
 fn shown(counted: &[(&str, Summary)]) -> Table {
     let mut table = Table::new();
     table.load_style(presets::UTF8_BORDERS_ONLY);
-    table.set_header([""].into_iter().chain(counted.iter().map(|(name, _)| *name)));
+    table.set_header([String::new()].into_iter().chain(counted.iter().map(|(name, _)| in_a_line(name))));
     let columns: Vec<_> = counted.iter().map(|(_, summary)| rows(summary)).collect();
     let Some(first) = columns.first() else { return table };
     for (row, (title, _)) in first.iter().enumerate() {

@@ -187,11 +187,14 @@ impl Logs {
     /// Says what is in them, and fails if one could not be written.
     fn end(&self) -> Result<()> {
         for Log { path, writer, .. } in &self.0 {
-            let now = format!("{} has {} now", path.display(), writer.lines());
-            writeln!(Messages, "{} lines were added: {}", writer.added, if path.exists() { now } else { gone(path) });
+            let now = match writer.check() {
+                Ok(()) => format!("{} has {} now", path.display(), writer.lines()),
+                Err(why) => why.to_string(),
+            };
+            writeln!(Messages, "{} lines were added: {now}", writer.added);
         }
         self.check()?;
-        self.0.iter().find(|log| !log.path.exists()).map_or(Ok(()), |log| bail!(gone(&log.path)))
+        Ok(self.0.iter().try_for_each(|log| log.writer.check())?)
     }
 
     /// Fails if one could not be written.
@@ -201,10 +204,6 @@ impl Logs {
             None => Ok(()),
         }
     }
-}
-
-fn gone(path: &Path) -> String {
-    format!("{} is gone, because it was moved or deleted meanwhile", path.display())
 }
 
 #[cfg(test)]

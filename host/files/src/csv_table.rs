@@ -336,8 +336,20 @@ impl Line<'_> {
 
     /// The error that this line has a problem.
     pub fn error(&self, problem: impl Into<String>) -> FileError {
-        FileError::Line { path: self.table.path.clone(), line: self.number, problem: problem.into() }
+        FileError::Line { path: self.table.path.clone(), line: self.number, problem: short(problem.into()) }
     }
+}
+
+/// A problem without its middle if it quotes a long cell. The advice at its end stays.
+fn short(problem: String) -> String {
+    const KEPT: usize = 200;
+    let length = problem.chars().count();
+    if length <= 2 * KEPT {
+        return problem;
+    }
+    let begin: String = problem.chars().take(KEPT).collect();
+    let end: String = problem.chars().skip(length - KEPT).collect();
+    format!("{begin} ... {end}")
 }
 
 /// A number with a decimal comma, with a point instead; other text as it is.

@@ -36,8 +36,21 @@ pub fn write<E: From<io::Error>>(path: &Path, contents: impl FnOnce(&mut dyn Wri
     contents(&mut buffered)?;
     buffered.flush()?;
     drop(buffered);
+    // After a loss of power, the name could lead to an empty file.
+    saved(file.as_file().sync_all())?;
     file.persist(path).map_err(|error| without_name(error.error))?;
     Ok(())
+}
+
+/// The result of asking the system to save a file to the disk. Some file systems save by themselves, and cannot be asked.
+///
+/// # Errors
+/// The other errors.
+pub fn saved(result: io::Result<()>) -> io::Result<()> {
+    match result {
+        Err(error) if matches!(error.kind(), ErrorKind::InvalidInput | ErrorKind::Unsupported) => Ok(()),
+        result => result,
+    }
 }
 
 /// Checks that a file can be written now. Leaves no file behind.

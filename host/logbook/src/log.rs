@@ -8,8 +8,9 @@
 
 use crate::disk::Disk;
 use files::bounded_file::RECORDED_MIB;
-use files::{CsvTable, FileError, in_a_line};
+use files::{CsvTable, FileError, in_a_line, whole_file};
 use link::session::Happening;
+use same_file::Handle;
 use std::fs::{File, OpenOptions};
 use std::io::{self, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -64,6 +65,9 @@ const LONGEST: u64 = 192 << 20;
 /// A log is not written any farther from here on, in bytes. A longer one might not be read.
 const FULL: u64 = (RECORDED_MIB - 1) << 20;
 
+/// After this many lines, the file has to be there still.
+const LINES_OF_A_CHECK: u64 = 256;
+
 /// Why a log cannot be written.
 #[derive(Debug, Error)]
 pub enum LogError {
@@ -79,6 +83,12 @@ pub enum LogError {
     /// With more lines, the file could not be read.
     #[error("{0} is full: no further line is written; write another log")]
     Full(PathBuf),
+    /// The file has no name any more, or its name leads to another file.
+    #[error("{0} is gone, because it was moved, deleted or replaced meanwhile")]
+    Gone(PathBuf),
+    /// Another program has written the file, so lines of it may be missing.
+    #[error("{0} was changed by another program meanwhile, and may lack lines")]
+    Changed(PathBuf),
     /// The lines of two programs would damage each other.
     #[error("another program writes {0}: end that one, or choose another name")]
     Shared(PathBuf),
@@ -125,6 +135,9 @@ pub struct LogWriter {
     found: u64,
     /// Lines that were written since.
     pub added: u64,
+    /// The file's end behind them, and whether another program has moved it.
+    end: u64,
+    is_changed: bool,
 }
 
 impl LogWriter {
@@ -154,19 +167,15 @@ impl LogWriter {
         }
         // Removes a last line that a power failure has cut off. It would damage the next line.
         let whole = end(&bytes, ENDS);
-        file.set_len(whole as u64).and_then(|()| file.seek(SeekFrom::End(0))).map_err(failed)?;
+        file.set_len(whole as u64).map_err(failed)?;
         let lines = bytes[..whole].split(|byte| ENDS.contains(byte)).filter(|line| !line.is_empty());
         let found = lines.count().saturating_sub(1) as u64;
         let saved = file.try_clone().map_err(failed)?;
-        let disk = Disk::new(move || match saved.sync_data() {
-            // Some file systems save by themselves, and cannot be asked.
-            Err(error) if matches!(error.kind(), ErrorKind::InvalidInput | ErrorKind::Unsupported) => Ok(()),
-            saved => saved,
-        })
-        .map_err(failed)?;
-        let mut log = Self { path: path.into(), file, disk, began: Instant::now(), found, added: 0 };
+        let disk = Disk::new(move || whole_file::saved(saved.sync_data())).map_err(failed)?;
+        let (began, end) = (Instant::now(), whole as u64);
+        let mut log = Self { path: path.into(), file, disk, began, found, added: 0, end, is_changed: false };
         if whole == 0 {
-            log.record(HEADER.split(','))?;
+            log.write_at(0, format!("{HEADER}\n").as_bytes()).map_err(failed)?;
         }
         Ok(log)
     }
@@ -224,6 +233,9 @@ impl LogWriter {
         if self.file.metadata().is_ok_and(|there| there.len() >= FULL) {
             return Err(LogError::Full(self.path.clone()));
         }
+        if self.added % LINES_OF_A_CHECK == LINES_OF_A_CHECK - 1 && !self.is_there() {
+            return Err(LogError::Gone(self.path.clone()));
+        }
         self.added += 1;
         // A record is one line of the table, even if the system's message about a lost port has several.
         self.record([time_ms.to_string().as_str(), kind.into(), &in_a_line(line)])
@@ -238,8 +250,39 @@ impl LogWriter {
     fn append<'a>(&mut self, fields: impl IntoIterator<Item = &'a str>) -> io::Result<()> {
         let mut record = csv::Writer::from_writer(Vec::new());
         record.write_record(fields)?;
-        let bytes = record.into_inner().map_err(csv::IntoInnerError::into_error)?;
-        self.file.write_all(&bytes)
+        let mut bytes = record.into_inner().map_err(csv::IntoInnerError::into_error)?;
+        // Another program may have cut the file: at the old place, the line would stand behind a hole.
+        let end = self.file.seek(SeekFrom::End(0)).unwrap_or(self.end);
+        self.is_changed |= end != self.end;
+        if end == 0 {
+            bytes.splice(..0, format!("{HEADER}\n").into_bytes());
+        }
+        self.write_at(end, &bytes)
+    }
+
+    /// Writes at the file's end.
+    fn write_at(&mut self, end: u64, bytes: &[u8]) -> io::Result<()> {
+        self.file.write_all(bytes)?;
+        self.end = end + bytes.len() as u64;
+        Ok(())
+    }
+
+    /// Whether the file still has its name.
+    fn is_there(&self) -> bool {
+        let Ok(opened) = self.file.try_clone().and_then(Handle::from_file) else { return self.path.exists() };
+        Handle::from_path(&self.path).is_ok_and(|named| named == opened)
+    }
+
+    /// Checks that every line is in the file of this name.
+    ///
+    /// # Errors
+    /// If another program has moved, replaced or changed it.
+    pub fn check(&self) -> Result<(), LogError> {
+        match (self.is_there(), self.is_changed) {
+            (false, _) => Err(LogError::Gone(self.path.clone())),
+            (true, true) => Err(LogError::Changed(self.path.clone())),
+            (true, false) => Ok(()),
+        }
     }
 }
 
@@ -387,6 +430,34 @@ mod tests {
             file.as_file().set_len(length).unwrap();
             assert_eq!(log.write(0, &Happening::Lost("no port".to_owned())).is_ok(), is_taken, "{length}");
         }
+    }
+
+    #[test]
+    fn a_log_that_another_program_cuts_or_replaces_stays_readable_and_is_reported() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log.csv");
+        let lost = || Happening::Lost("no port".to_owned());
+        for kept in [0, 1, 2] {
+            let mut log = LogWriter::open(&path).unwrap();
+            for _ in 0..3 {
+                log.write(0, &lost()).unwrap();
+            }
+            log.check().unwrap();
+            // As an editor saves it, in place: the heading and some lines.
+            let text = fs::read_to_string(&path).unwrap();
+            fs::write(&path, text.split_inclusive('\n').take(kept).collect::<String>()).unwrap();
+            log.write(0, &lost()).unwrap();
+            assert_eq!(read(&path).unwrap().len(), kept.saturating_sub(1) + 1);
+            assert!(log.check().unwrap_err().to_string().ends_with("may lack lines"));
+            drop(log);
+            fs::remove_file(&path).unwrap();
+        }
+        let mut log = LogWriter::open(&path).unwrap();
+        let copy = folder.path().join("copy.csv");
+        fs::copy(&path, &copy).unwrap();
+        fs::rename(&copy, &path).unwrap();
+        let refused = (0..LINES_OF_A_CHECK).find_map(|_| log.write(0, &lost()).err()).expect("it is noticed");
+        assert!(refused.to_string().contains("moved, deleted or replaced"), "{refused}");
     }
 
     #[test]

@@ -234,3 +234,9 @@ fn short_lines_and_empty_tables_are_errors_unless_allowed() {
     assert!(CsvTable::read(&path, &["place_mm"]).is_err());
     assert_eq!(CsvTable::read_or_empty(&path, &["place_mm"]).unwrap().lines().count(), 0);
 }
+
+#[test]
+fn a_long_cell_is_quoted_without_its_middle() {
+    let error = read(format!("place_mm\n{}\n", "x".repeat(9000))).unwrap_err();
+    assert!(error.len() < 500 && error.ends_with("it has to be a whole number"), "{error}");
+}
