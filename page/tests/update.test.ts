@@ -229,7 +229,7 @@ test("kept settings can be put back until the machine has saved them, with the c
     const opened = await open(browser, "work", PHONE, [uno]);
     const { page } = opened;
     const part = (name: string) => page.locator(`#view-work [data-part="${name}"]`);
-    const kept = { ticks_per_rev: 2400, wheel_mm: 410, ticks_per_m: 1862, merge_gap_ticks: 100 };
+    const kept = { ticks_per_rev: 2400, wheel_mm: 410, ticks_per_m: 1862, merge_gap_ticks: 100, lead_out_ms: 180 };
     await page.evaluate((kept) => localStorage.setItem("weeder.settings", kept), JSON.stringify(Object.entries(kept)));
     await page.getByRole("button", { name: "Connect an Uno" }).click();
     for (const [at, line] of ["set ticks_per_m 1862", "save", "clear"].entries()) {
@@ -251,7 +251,13 @@ test("kept settings can be put back until the machine has saved them, with the c
         .waitFor();
     await again();
     assert(await part("restore").isHidden());
-    for (const [name, value] of Object.entries({ wheel_mm: 410, ticks_per_m: 1862, merge_gap_mm: 54 }))
+    // The factory's lead of the version with the old gap is not safe.
+    for (const [name, value] of Object.entries({
+        wheel_mm: 410,
+        ticks_per_m: 1862,
+        merge_gap_mm: 54,
+        lead_out_ms: 230,
+    }))
         assert.equal(await page.locator(`#work-panel [data-setting=${name}]`).inputValue(), String(value), name);
     await close(opened);
 });

@@ -153,7 +153,7 @@ fn in_json(arguments: &Arguments, pass: &Pass, outcome: &Outcome) -> Value {
         "field": arguments.field(),
         "seed": arguments.course.row.is_none().then_some(arguments.course.seed),
         "damaged": judgement.count(Verdict::Damaged),
-        "zones_reached": judgement.reached(),
+        "zones_reached": judgement.count(Verdict::Reached),
         "margin_cut": judgement.count(Verdict::MarginCut),
         "kept": judgement.count(Verdict::Kept),
         "idle_swings": judgement.idle_swings,

@@ -10,7 +10,7 @@ import { tickMm } from "./grammar.ts";
 export class SettingsFileError extends Error {}
 
 /** How files of 0.1.0 name `merge_gap_mm`, which was in ticks of the encoder. */
-const OLD_MERGE_GAP = "merge_gap_ticks";
+export const OLD_MERGE_GAP = "merge_gap_ticks";
 
 export function range({ isSwitched, least, greatest, unit, default: usual }: Setting): string {
     if (isSwitched) return english("rangeSwitched", { usual: String(usual === 1) });
