@@ -5,7 +5,7 @@ import { readdirSync, statSync } from "node:fs";
 import test from "node:test";
 
 /** Greatest size with the firmware, the Rust, and four languages. Raise it to the measured size, with a reason. */
-const MOST_KIB = 606;
+const MOST_KIB = 600;
 
 test("the page is not larger than it is meant to be", (test) => {
     const bytes = readdirSync("dist").reduce((sum, name) => sum + statSync(`dist/${name}`).size, 0);

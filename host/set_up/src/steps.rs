@@ -6,6 +6,35 @@ use link::settings::{Setting, name};
 
 const PAGE: &str = include_str!("../../../docs/set-up.md");
 
+/// The page's steps are between these marks.
+const BEGIN: usize = position(PAGE, "<!-- steps -->");
+const END: usize = position(PAGE, "<!-- steps end -->");
+
+/// The steps alone: no program contains the rest of the page.
+static STEPS: [u8; END - BEGIN] = {
+    let (mut steps, mut at) = ([0; END - BEGIN], 0);
+    while at < steps.len() {
+        steps[at] = PAGE.as_bytes()[BEGIN + at];
+        at += 1;
+    }
+    steps
+};
+
+/// The position of a mark that is in the text.
+const fn position(text: &str, mark: &str) -> usize {
+    let (text, mark, mut at) = (text.as_bytes(), mark.as_bytes(), 0);
+    loop {
+        let mut same = 0;
+        while same < mark.len() && text[at + same] == mark[same] {
+            same += 1;
+        }
+        if same == mark.len() {
+            return at;
+        }
+        at += 1;
+    }
+}
+
 /// A step of the page.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ManualStep {
@@ -63,13 +92,13 @@ impl ManualStep {
 
 /// The steps, in the page's order.
 pub fn steps() -> Vec<ManualStep> {
-    sections(PAGE).filter_map(step).collect()
+    sections().filter_map(step).collect()
 }
 
-/// The page's sections that are steps, each from its number on.
-fn sections(page: &'static str) -> impl Iterator<Item = &'static str> {
-    let steps = page.split_once("<!-- steps -->").and_then(|(_, rest)| rest.split_once("<!-- steps end -->"));
-    steps.map_or("", |(steps, _)| steps).split("\n### ").skip(1)
+/// The sections that are steps, each from its number on.
+fn sections() -> impl Iterator<Item = &'static str> {
+    // The marks are whole characters of a text.
+    str::from_utf8(&STEPS).unwrap_or_default().split("\n### ").skip(1)
 }
 
 /// Parses a section: its number and title, a line of instruction, and the lines to type, if there are any.
@@ -89,7 +118,7 @@ mod tests {
     #[test]
     fn every_section_of_the_page_is_a_step_and_the_margin_is_the_last() {
         let steps = steps();
-        assert_eq!(steps.len(), sections(PAGE).count(), "a section is not understood");
+        assert_eq!(steps.len(), sections().count(), "a section is not understood");
         assert!((5..=12).contains(&steps.len()), "{}", steps.len());
         assert!(steps.iter().map(|step| step.number).eq(1..=steps.len()));
         for step in &steps {
