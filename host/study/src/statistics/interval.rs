@@ -1,10 +1,11 @@
 //! Intervals of figures: exact intervals of counted shares, and intervals of means.
 //!
-//! A share's interval is Clopper and Pearson's, by the quantiles of the beta distribution, as in R's `binom.test`. It
-//! covers the true share in at least 95 of 100 trials if the plants are independent, for any number of plants. The plants
-//! of a row are not: they share its slip, steering and servo. If plots scatter by more than counting does, the interval
-//! covers less. If none or all were counted, the 5 % lie on one side (R's `alternative = "less"` or `"greater"`). So none
-//! of `n` gives "below about `3 / n`". A mean's interval is Student's, as in R's `t.test`, over replications that are
+//! A share's interval is Clopper and Pearson's, by the quantiles of the beta distribution, as in R's `binom.test`. If none
+//! or all were counted, the 5 % lie on one side (R's `alternative = "less"` or `"greater"`). So none of `n` gives "below
+//! about `3 / n`". Each of these intervals by itself covers the true share in at least 95 of 100 trials, for any number of
+//! plants, if they are independent. Because the count chooses the side, it is 92.5 of 100 for the rule as a whole. The
+//! plants of a row are not independent: they share its slip, steering and servo. If plots scatter by more than counting
+//! does, the interval covers less. A mean's interval is Student's, as in R's `t.test`, over replications that are
 //! assumed independent.
 
 use super::design::{is_zero, mean, scatter};
@@ -13,7 +14,7 @@ use serde::Serialize;
 use statrs::distribution::{Beta, ContinuousCDF, Normal, StudentsT};
 use std::fmt::{self, Display, Formatter};
 
-/// The least probability that an interval covers the true figure, if what is counted is independent.
+/// The least probability that an interval by itself covers the true figure, if what is counted is independent.
 pub const CONFIDENCE: f64 = 0.95;
 
 /// A count out of a total, with the interval of its share.
