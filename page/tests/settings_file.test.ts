@@ -32,3 +32,13 @@ test("a merge gap in ticks, as older files have it, is read in millimetres", () 
     const older = [...SETTINGS, setting("merge_gap_ticks", 40, 2000)];
     assert.deepEqual([...parse("merge_gap_ticks = 60", older)], [["merge_gap_ticks", 60]]);
 });
+
+test("a file with another wheel and the machine's own calibration is refused", () => {
+    const own = SETTINGS.map((own) => (own.name === "ticks_per_m" ? setting("ticks_per_m", 1929, 20000) : own));
+    assert.throws(
+        () => parse("wheel_mm = 410\nticks_per_m = 1929", own),
+        /ticks_per_m 1929 was measured with the wheel/,
+    );
+    assert.equal(parse("wheel_mm = 410\nticks_per_m = 1862", own).get("ticks_per_m"), 1862);
+    assert.equal(parse("wheel_mm = 400\nticks_per_m = 1929", own).get("ticks_per_m"), 1929);
+});

@@ -64,11 +64,11 @@ fn another_wheel_is_pushed_with_what_was_measured_of_it_or_with_nothing() {
     assert_eq!((changed, ticks_per_m(&mut link)), (vec!["wheel_mm".to_owned(), "ticks_per_m".to_owned()], 0));
     link.ask("set ticks_per_m 1950").expect("the firmware knows the command");
     // A pulled file in which only the wheel was edited has the calibration of the wheel before. Another file has its own.
-    for (wheel_mm, ticks, left) in [(400, 1950, 0), (410, 1862, 1862)] {
-        let both = [(Setting::WheelMm, wheel_mm), (Setting::TicksPerM, ticks)];
-        let changed = settings::push(&mut link, &both, &[], true).expect("the firmware takes both");
-        assert_eq!((changed, ticks_per_m(&mut link)), (vec!["wheel_mm".to_owned(), "ticks_per_m".to_owned()], left));
-    }
+    let with = |ticks| [(Setting::WheelMm, 400), (Setting::TicksPerM, ticks)];
+    let refused = settings::push(&mut link, &with(1950), &[], true).unwrap_err().to_string();
+    assert!(refused.contains("ticks_per_m 1950 was measured with the wheel before"), "{refused}");
+    let changed = settings::push(&mut link, &with(1952), &[], true).expect("the firmware takes both");
+    assert_eq!((changed, ticks_per_m(&mut link)), (vec!["wheel_mm".to_owned(), "ticks_per_m".to_owned()], 1952));
 }
 
 #[test]

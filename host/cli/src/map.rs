@@ -85,7 +85,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             let records = counted.iter().map(|(record, summary)| json!({ "record": record, "count": summary }));
             writeln!(Results, "{:#}", serde_json::Value::from_iter(records))
         }
-        false => write!(Results, "{}\n", shown(&counted)),
+        false => writeln!(Results, "{}", shown(&counted)),
     };
     let named: Vec<(&str, &Job)> = jobs.iter().map(|(name, job)| (name.as_str(), job)).collect();
     out.write(|to| Ok(writeln!(to, "{}", map::features(&named))?))?;

@@ -40,12 +40,12 @@ and q stops. The next call continues at the open step. It ends with a summary.
 Examples:
   weeder set-up --port /dev/ttyACM0
   weeder set-up --machine my.toml                 offers the stroke and leads of `weeder design --machine my.toml`
-  weeder set-up --state left.txt --port left      each board has its own file
+  weeder set-up --state left.txt --port left      each machine has its own file
   weeder set-up --simulated                       what each step brings in the simulated field")]
 pub struct Arguments {
     #[command(flatten)]
     port: Port,
-    /// The file for progress and measurements. It belongs to one board.
+    /// The file for progress and measurements. It belongs to one machine.
     #[arg(long, value_name = "FILE", default_value = "set-up.txt")]
     state: PathBuf,
     /// Your machine, as for `weeder design`. Without it, the measures of arm, tool and servo are asked.
@@ -54,7 +54,7 @@ pub struct Arguments {
     /// Start again at the first step, and forget the measurements.
     #[arg(long)]
     again: bool,
-    /// Do this step again: after another servo or arm, 6; after another wheel, 7.
+    /// Do this step again, 1 to 8: 3 with another tool, 5 with another arm, 6 with another servo, 7 with another wheel.
     #[arg(long, value_name = "N", value_parser = whole_within(1..=steps().len()), conflicts_with = "again")]
     step: Option<usize>,
     /// Do the steps on the simulated machine, and print what each of them brings.
@@ -84,7 +84,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let known = machine.map_or_else(|| asked(&state), Ok)?;
     take_arm(&mut state.measured, &known);
     let board = Board::at(&arguments.port.board()?.port()?)?;
-    let changes = Changes { other_board: state.take_board(&board), measures, step: arguments.step };
+    let changes = Changes { other_board: state.take_board(&board), measures, again: arguments.step };
     let link = board.open()?;
     let stop = crate::ctrl_c()?;
     let guide = Guide { link, state, machine, typed: input::typed(), path: path.clone(), watches: false, stop };
@@ -131,18 +131,23 @@ impl Guide {
     fn lead(mut self, changes: Changes) -> Result<()> {
         writeln!(Results, "Enter takes what stands in [brackets], s leaves a step out, q stops.")?;
         self.link.ask("events on")?;
-        self.compare(changes)?;
+        self.compare(&changes)?;
         let steps = steps();
         let count = steps.len();
         for step in &steps {
             let ManualStep { number, title, how, tasks } = step;
             let why = self.open(tasks)?;
             // The last step follows from the others, and is asked for each time.
-            if self.state.done.contains(number) && why.is_none() && *number < count {
+            let is_again = changes.again == Some(*number);
+            if self.state.done.contains(number) && why.is_none() && *number < count && !is_again {
                 writeln!(Results, "Step {number} of {count}, {title}: done")?;
                 continue;
             }
             writeln!(Results, "\nStep {number} of {count}: {title}\n  {how}")?;
+            if is_again {
+                // The file has the earlier measurements until a new one is kept.
+                self.forget(tasks);
+            }
             if let Err(error) = self.step(tasks) {
                 if error.downcast_ref() != Some(&End::LeaveOut) {
                     return Err(error);
@@ -160,6 +165,17 @@ impl Guide {
             self.keep()?;
         }
         self.summary(&steps)
+    }
+
+    /// Forgets what these tasks have measured.
+    fn forget(&mut self, tasks: &[Task]) {
+        for task in tasks {
+            match task {
+                Task::TimeServo => self.state.measured.forget_timings(),
+                Task::MeasureWheel(_) => self.state.measured.ticks_per_m.clear(),
+                _ => {}
+            }
+        }
     }
 
     /// Stops if the user has typed Ctrl-C: the tool may be in the row, or swing.
@@ -248,7 +264,7 @@ impl Guide {
         };
         writeln!(Results, "  Expected{if_open}: {said}")?;
         if expected.is_ok_and(|(_, damaged_percent)| damaged_percent > MOST_DAMAGED_PERCENT) {
-            writeln!(Results, "  Warning: it damages too many plants. Do not weed before the steps are done.")?;
+            writeln!(Results, "  Warning: that damages too many plants. Do not weed like this.")?;
         }
         writeln!(Results, "  The measurements are in {}.", self.path.display())?;
         if is_open {

@@ -114,7 +114,7 @@ pub fn working_speed(settings: &Settings) -> Option<u16> {
     // As in the firmware's contradiction of a beam that is too near.
     let room_mm = beam_to_tool_mm.saturating_sub(second_beam_mm.max(margin_mm + zone_mm / 2) + 1);
     let mm_s = 1000 * room_mm / (lead_out_ms + lead_out_ms / 8 + response_ms + 1);
-    (second_beam_mm > 0).then_some(mm_s as u16)
+    (second_beam_mm > 0).then_some(mm_s.try_into().unwrap_or(u16::MAX))
 }
 
 /// Reads all settings in use.
@@ -288,10 +288,13 @@ pub fn steps(from: &Settings, to: &Settings) -> Vec<(Setting, u16)> {
 
 /// Another wheel has no calibration yet: the firmware resets it by itself ([`Settings::change`]).
 pub fn follow_wheel(before: &Settings, after: &mut Settings) {
-    let is_another = |setting: Setting| setting.is_of_the_wheel() && before.get(setting) != after.get(setting);
-    if Setting::all().any(is_another) {
+    if is_another_wheel(before, after) {
         let _ = after.set(Setting::TicksPerM, 0);
     }
+}
+
+fn is_another_wheel(one: &Settings, other: &Settings) -> bool {
+    Setting::all().any(|setting| setting.is_of_the_wheel() && one.get(setting) != other.get(setting))
 }
 
 /// A pulse width near the target of `setting` that differs from the present and target values of both pulses.
@@ -319,9 +322,8 @@ pub struct Foreign {
 
 /// Sets some settings, leaves the others unchanged, and reads all back. `save` saves them. Returns the changed settings.
 ///
-/// Another wheel has no calibration unless `wanted` has another one than the board: `ticks_per_m` becomes 0.
-///
-/// Sends nothing if the result would contradict itself, or if the machine is at work. Settings that only the machine's
+/// Sends nothing if the result would contradict itself, if it has another wheel with the board's calibration, or if the machine is at
+/// work. Settings that only the machine's
 /// version has, or whose values only it has, are sent as they are, and the machine checks them.
 ///
 /// # Errors
@@ -360,9 +362,20 @@ pub fn push(
             changed.push((foreign.name.clone(), format!("set {} {value}", foreign.name)));
         }
     }
-    // The board's own calibration is of the wheel before, also where a pulled file of that wheel has it.
-    if after.get(Setting::TicksPerM) == before.get(Setting::TicksPerM) && !shown.missing.contains(&Setting::TicksPerM) {
+    let wants_calibration = wanted.iter().any(|&(setting, _)| setting == Setting::TicksPerM);
+    if !wants_calibration && !shown.missing.contains(&Setting::TicksPerM) {
         follow_wheel(before, &mut after);
+    }
+    // A pulled file in which the wheel was edited.
+    let ticks_per_m = after.get(Setting::TicksPerM);
+    if wants_calibration
+        && ticks_per_m > 0
+        && ticks_per_m == before.get(Setting::TicksPerM)
+        && is_another_wheel(before, &after)
+    {
+        return Err(SettingsError::Contradiction(format!(
+            "ticks_per_m {ticks_per_m} was measured with the wheel before: write 0, and calibrate the new one"
+        )));
     }
     let is_beyond = |(setting, own): &&(Setting, RangeInclusive<u16>)| !own.contains(&after.get(*setting));
     if let Some((setting, own)) = shown.ranges.iter().find(is_beyond) {
@@ -441,6 +454,17 @@ mod tests {
     fn lines_with(change: impl Fn(&str) -> Option<String>) -> Vec<String> {
         let mut rig = Rig::wake(Nearest::new(&EXAMPLES[..], Volatile::new()), Volatile::new(), Cause::Unknown);
         rig.ask("get").iter().filter_map(|line| change(line)).collect()
+    }
+
+    #[test]
+    fn a_second_beam_limits_the_speed_by_its_distance_to_the_tool() {
+        let beam = |second_beam_mm| Settings::with(&[(Setting::SecondBeamMm, second_beam_mm)]);
+        assert_eq!(working_speed(&beam(0)), None);
+        // Within nine eighths of 230 ms, and a millisecond.
+        assert_eq!(working_speed(&beam(200)), Some((1000.0 * 199.0 / 259.0) as u16));
+        assert_eq!(working_speed(&beam(72)), Some((1000.0 * (400.0 - 72.0 - 1.0) / 259.0) as u16));
+        let lead = [(Setting::SecondBeamMm, 72), (Setting::MarginMm, 150), (Setting::LeadOutMs, 0)];
+        assert_eq!(working_speed(&Settings::with(&lead)), Some(u16::MAX));
     }
 
     #[test]

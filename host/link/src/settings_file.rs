@@ -17,6 +17,9 @@ const HEAD: &str = "\
 /// How files of 0.1.0 name `merge_gap_mm`, which was in ticks of the encoder.
 const OLD_MERGE_GAP: &str = "merge_gap_ticks";
 
+/// The factory's leads and top speed of the version with that name, which are not safe. They are left out.
+const UNSAFE: [(Setting, u16); 3] = [(Setting::LeadOutMs, 180), (Setting::LeadInMs, 40), (Setting::TopSpeedMmS, 1400)];
+
 /// The settings in a file.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Named {
@@ -96,6 +99,9 @@ fn parse(path: &Path, text: &str) -> Result<(DocumentMut, Named), FileError> {
             }
             None => return Err(problem),
         }
+    }
+    if old_merge_gap.is_some() {
+        settings.retain(|setting| !UNSAFE.contains(setting));
     }
     if let Some((value, problem)) = old_merge_gap
         && settings.iter().all(|&(setting, _)| setting != Setting::MergeGapMm)
@@ -310,6 +316,9 @@ mod tests {
         assert_eq!(gap("merge_gap_ticks = 2000\nticks_per_m = 500"), Some((Setting::MergeGapMm, 1000)));
         assert_eq!(gap("merge_gap_ticks = 40\nmerge_gap_mm = 5"), Some((Setting::MergeGapMm, 5)));
         assert!(parsed("merge_gap_ticks = 2001").unwrap_err().contains("now it is merge_gap_mm"));
+        // The factory's lead of that version is left out, and another one is the user's.
+        let leads = parsed("merge_gap_ticks = 40\nlead_out_ms = 180\nlead_in_ms = 30").unwrap().settings;
+        assert_eq!(leads, [(Setting::LeadInMs, 30)]);
         let generated = "# mine\n\n# only the machine's firmware knows this setting, or this value\n# 0 to 2000 ticks\nmerge_gap_ticks = 40\n";
         let new = updated(Path::new("machine.toml"), generated, &Shown::default()).unwrap();
         assert!(new.starts_with("# mine\n\n# ") && new.contains(" mm, default 21\nmerge_gap_mm = "), "{new}");

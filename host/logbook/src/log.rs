@@ -65,9 +65,6 @@ const LONGEST: u64 = 192 << 20;
 /// A log is not written any farther from here on, in bytes. A longer one might not be read.
 const FULL: u64 = (RECORDED_MIB - 1) << 20;
 
-/// After this many lines, the file has to be there still.
-const LINES_OF_A_CHECK: u64 = 256;
-
 /// Why a log cannot be written.
 #[derive(Debug, Error)]
 pub enum LogError {
@@ -233,9 +230,6 @@ impl LogWriter {
         if self.file.metadata().is_ok_and(|there| there.len() >= FULL) {
             return Err(LogError::Full(self.path.clone()));
         }
-        if self.added % LINES_OF_A_CHECK == LINES_OF_A_CHECK - 1 && !self.is_there() {
-            return Err(LogError::Gone(self.path.clone()));
-        }
         self.added += 1;
         // A record is one line of the table, even if the system's message about a lost port has several.
         self.record([time_ms.to_string().as_str(), kind.into(), &in_a_line(line)])
@@ -256,6 +250,9 @@ impl LogWriter {
         self.is_changed |= end != self.end;
         if end == 0 {
             bytes.splice(..0, format!("{HEADER}\n").into_bytes());
+        } else if end != self.end {
+            // It may end within a line.
+            bytes.insert(0, b'\n');
         }
         self.write_at(end, &bytes)
     }
@@ -270,15 +267,16 @@ impl LogWriter {
     /// Whether the file still has its name.
     fn is_there(&self) -> bool {
         let Ok(opened) = self.file.try_clone().and_then(Handle::from_file) else { return self.path.exists() };
-        Handle::from_path(&self.path).is_ok_and(|named| named == opened)
+        Handle::from_path(&self.path).map_or_else(|error| error.kind() != ErrorKind::NotFound, |named| named == opened)
     }
 
-    /// Checks that every line is in the file of this name.
+    /// Checks that the file has its name and its length still.
     ///
     /// # Errors
-    /// If another program has moved, replaced or changed it.
+    /// If another program has moved, replaced, cut or lengthened it.
     pub fn check(&self) -> Result<(), LogError> {
-        match (self.is_there(), self.is_changed) {
+        let is_changed = self.is_changed || self.file.metadata().is_ok_and(|there| there.len() != self.end);
+        match (self.is_there(), is_changed) {
             (false, _) => Err(LogError::Gone(self.path.clone())),
             (true, true) => Err(LogError::Changed(self.path.clone())),
             (true, false) => Ok(()),
@@ -437,7 +435,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("log.csv");
         let lost = || Happening::Lost("no port".to_owned());
-        for kept in [0, 1, 2] {
+        for (kept, cut) in [(0, ""), (1, ""), (2, ""), (2, "0,lost,no po")] {
             let mut log = LogWriter::open(&path).unwrap();
             for _ in 0..3 {
                 log.write(0, &lost()).unwrap();
@@ -445,9 +443,10 @@ mod tests {
             log.check().unwrap();
             // As an editor saves it, in place: the heading and some lines.
             let text = fs::read_to_string(&path).unwrap();
-            fs::write(&path, text.split_inclusive('\n').take(kept).collect::<String>()).unwrap();
+            fs::write(&path, text.split_inclusive('\n').take(kept).collect::<String>() + cut).unwrap();
+            assert!(log.check().is_err(), "before a further line too");
             log.write(0, &lost()).unwrap();
-            assert_eq!(read(&path).unwrap().len(), kept.saturating_sub(1) + 1);
+            assert_eq!(read(&path).unwrap().len(), kept.saturating_sub(1) + 1 + usize::from(!cut.is_empty()));
             assert!(log.check().unwrap_err().to_string().ends_with("may lack lines"));
             drop(log);
             fs::remove_file(&path).unwrap();
@@ -456,7 +455,8 @@ mod tests {
         let copy = folder.path().join("copy.csv");
         fs::copy(&path, &copy).unwrap();
         fs::rename(&copy, &path).unwrap();
-        let refused = (0..LINES_OF_A_CHECK).find_map(|_| log.write(0, &lost()).err()).expect("it is noticed");
+        log.write(0, &lost()).unwrap();
+        let refused = log.check().unwrap_err();
         assert!(refused.to_string().contains("moved, deleted or replaced"), "{refused}");
     }
 

@@ -135,14 +135,12 @@ impl Design {
         // Half of the sweeps run between the machine's row and the next one.
         let beside = machine.inter_row.tools.div_ceil(2);
         let width = f64::from(beside) * machine.inter_row.width;
-        let sweeps = format!("{beside} of the sweeps, {} side by side,", written(width, MM));
+        let sweeps = if beside == 1 { "one sweep".to_owned() } else { format!("{beside} sweeps side by side") };
         let sweep_sense = if width > self.sweep_width {
-            concern(format!("{sweeps} break soil in a protection zone"))
+            concern(format!("{sweeps}, {} wide, would break soil in a protection zone", written(width, MM)))
         } else {
-            fine(format!(
-                "{sweeps} keep off the crop, and leave {} of it unused",
-                written(self.sweep_width - width, MM)
-            ))
+            let left = written(self.sweep_width - width, MM);
+            fine(format!("{sweeps}, {} wide: off the crop, and {left} are left", written(width, MM)))
         };
         let apex = machine.inter_row.apex_angle;
         let apex_sense = if apex > self.apex_angle {

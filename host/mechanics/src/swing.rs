@@ -205,7 +205,9 @@ impl Swing {
         let board_mm = f64::from(settings.get(Setting::MarginMm));
         let wider_mm = arm_margin_mm + blade_margin_mm + stem_margin_mm;
         let wide_mm = if wider_mm > 0.0 { f64::from(Setting::MarginMm.default()) + wider_mm } else { 0.0 };
-        let wide_advice = if blade_margin_mm > arm_margin_mm {
+        let wide_advice = if stem_margin_mm > blade_margin_mm.max(arm_margin_mm) {
+            "keep whole canopies, with `protected` 0"
+        } else if blade_margin_mm > arm_margin_mm {
             "take a blade that is shorter along the row"
         } else {
             "take a longer arm, or a pendulum"

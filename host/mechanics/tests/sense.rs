@@ -64,12 +64,12 @@ fn a_shank_bends_or_bears_its_load() {
 fn sweeps_are_too_wide_or_too_blunt_or_right() {
     let width = |mm: f64| figure_with("sweep_width", |machine| machine.inter_row.width = MM.of(mm));
     // Two run between the machine's row and the next one.
-    assert_sense(&width(80.0), false, "2 of the sweeps, 160 mm side by side, keep off the crop, and leave 11.13 mm");
-    assert_sense(&width(86.0), true, "172 mm side by side, break soil in a protection zone");
+    assert_sense(&width(80.0), false, "2 sweeps side by side, 160 mm wide: off the crop, and 11.13 mm are left");
+    assert_sense(&width(86.0), true, "172 mm wide, would break soil in a protection zone");
     let one_a_side = figure_with("sweep_width", |machine| {
         (machine.inter_row.tools, machine.inter_row.width) = (2, MM.of(170.0));
     });
-    assert_sense(&one_a_side, false, "1 of the sweeps, 170 mm side by side, keep off the crop");
+    assert_sense(&one_a_side, false, "one sweep, 170 mm wide: off the crop");
     let apex = |degrees: f64| figure_with("apex_angle", |machine| machine.inter_row.apex_angle = DEGREE.of(degrees));
     assert_sense(&apex(120.0), true, "right for a friction of 30 degrees");
     assert_sense(&apex(80.0), false, "weeds slide along");

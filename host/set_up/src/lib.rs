@@ -61,9 +61,9 @@ const FIRMWARE_MM: f64 = 5.0;
 /// Beside a stem zone the margin is calculated for this speed, 1 km/h.
 const SLOW_M_S: f64 = 1.0 / 3.6;
 
-/// How far a stem's protected ground may reach beyond its zone, as a share of the stem's distance from the middle of its
-/// canopy. The zone has that distance once, half on each side, so it is a half at most. Few stems stand so far off that
-/// this share keeps the damage below 1 plant in 10,000.
+/// How far a stem's protected ground reaches beyond its zone, as a share of the stem's distance from the middle of its
+/// canopy. The zone has room for half of the distance on each side, so the other half is left. Hardly any stem stands at the
+/// full distance: with this share, fewer than 1 plant in 10,000 is damaged.
 const STEM_REACH: f64 = 0.484;
 
 /// The least of these distances that is assumed, as a share of the zone: 20 of 110 mm in the field `walked`.
@@ -328,6 +328,9 @@ impl SetUp {
                 Margin { servo_mm, .. } if servo_mm > slip_mm.max(arm_mm).max(blade_mm) => SEE_TO_SERVO,
                 _ if blade_mm > slip_mm.max(arm_mm) => "take a blade that is shorter along the row",
                 _ if arm_mm > slip_mm => "shorten the trailing arm's stroke",
+                Margin { stems_mm: Some(stems_mm), .. } if stems_mm > slip_mm => {
+                    "set `stem_zone_mm 0`, and keep whole canopies"
+                }
                 _ if second_beam_mm > 0.0 => "roll past more plants",
                 _ => "`set ticks_per_m 0`, and measure the wheel again",
             },

@@ -10,7 +10,10 @@ import { tickMm } from "./grammar.ts";
 export class SettingsFileError extends Error {}
 
 /** How files of 0.1.0 name `merge_gap_mm`, which was in ticks of the encoder. */
-export const OLD_MERGE_GAP = "merge_gap_ticks";
+const OLD_MERGE_GAP = "merge_gap_ticks";
+
+/** The factory's leads and top speed of 0.1.0, which are not safe. */
+const UNSAFE = { lead_out_ms: 180, lead_in_ms: 40, top_speed_mm_s: 1400 };
 
 export function range({ isSwitched, least, greatest, unit, default: usual }: Setting): string {
     if (isSwitched) return english("rangeSwitched", { usual: String(usual === 1) });
@@ -29,11 +32,15 @@ export function save(settings: readonly Setting[], help: ReadonlyMap<string, str
     download("machine.toml", head + entries.join(""), "application/toml");
 }
 
-/** Converts the gap of 0.1.0, unless the present one is there. `value` is that of a setting. */
-export function renameOldGap(values: Map<string, number>, value: (name: string) => number): void {
+/**
+ * Makes settings of 0.1.0 present ones: converts the gap, unless the present one is there, and leaves out what is not safe.
+ * `value` is that of a setting.
+ */
+export function update(values: Map<string, number>, value: (name: string) => number): void {
     const ticks = values.get(OLD_MERGE_GAP);
-    if (ticks !== undefined && !values.has("merge_gap_mm"))
-        values.set("merge_gap_mm", Math.min(1000, Math.round(ticks * tickMm(value))));
+    if (ticks === undefined) return;
+    if (!values.has("merge_gap_mm")) values.set("merge_gap_mm", Math.min(1000, Math.round(ticks * tickMm(value))));
+    for (const [name, old] of Object.entries(UNSAFE)) if (values.get(name) === old) values.delete(name);
     values.delete(OLD_MERGE_GAP);
 }
 
@@ -68,8 +75,14 @@ export function parse(text: string, settings: readonly Setting[]): Map<string, n
         values.set(name, value);
     }
     // Settings that the file does not name are the machine's.
-    const value = (name: string) => values.get(name) ?? settings.find((setting) => setting.name === name)?.value ?? 0;
-    if (!isOld) renameOldGap(values, value);
+    const own = (name: string) => settings.find((setting) => setting.name === name)?.value ?? 0;
+    const value = (name: string) => values.get(name) ?? own(name);
+    if (!isOld) update(values, value);
+    const ticks = values.get("ticks_per_m");
+    const isOtherWheel = ["ticks_per_rev", "wheel_mm"].some((name) => value(name) !== own(name));
+    // A saved file in which the wheel was edited.
+    if (ticks && ticks === own("ticks_per_m") && isOtherWheel)
+        throw new SettingsFileError(english("fileOldWheel", { value: ticks }));
     if (values.size === 0) throw new SettingsFileError(english("fileEmpty"));
     return values;
 }

@@ -157,9 +157,6 @@ export class SettingsForm {
         const file = opened.name;
         try {
             const values = parse(await opened.text(), this.machine.settings);
-            const { value: calibrated } = this.machine.settings.find(({ name }) => name === "ticks_per_m") ?? {};
-            // A file with the machine's own calibration and another wheel was edited: that calibration is of the wheel before.
-            if (values.get("ticks_per_m") === calibrated) values.delete("ticks_per_m");
             for (const [name, value] of values) this.#wanted.set(name, value);
             this.show();
             const { size: count } = this.#wanted;

@@ -4,20 +4,13 @@
 import { ask as askRust } from "../core.ts";
 import type { Parts } from "../dom.ts";
 import type { Happening } from "../link/session.ts";
-import { OLD_MERGE_GAP, renameOldGap, save } from "../link/settings_file.ts";
+import { save, update } from "../link/settings_file.ts";
 import { chosen, keep } from "../preferences.ts";
 import { say } from "../words/words.ts";
 import type { Panel } from "./panel.ts";
 
 /** The key of the stored settings, until the new firmware has them. */
 const KEPT = "settings";
-
-/** The factory's leads and top speed of 0.1.0, which are not safe. Its settings have the old name of the gap. */
-const UNSAFE = new Map([
-    ["lead_out_ms", 180],
-    ["lead_in_ms", 40],
-    ["top_speed_mm_s", 1400],
-]);
 
 export class Update {
     readonly #own = askRust<{ readonly version: string; readonly settings: readonly string[] }>("firmware");
@@ -64,9 +57,7 @@ export class Update {
     /** The stored settings, until the machine has saved them. */
     #kept(): Map<string, number> {
         const kept = new Map<string, number>(JSON.parse(chosen(KEPT) || "[]"));
-        if (kept.has(OLD_MERGE_GAP))
-            for (const [name, value] of UNSAFE) if (kept.get(name) === value) kept.delete(name);
-        renameOldGap(kept, (name) => kept.get(name) ?? 0);
+        update(kept, (name) => kept.get(name) ?? 0);
         return kept;
     }
 

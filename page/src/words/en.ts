@@ -391,6 +391,7 @@ export const heard = {
     fileForm: "it has to be a setting's name, =, and its value",
     fileOldGap: "{name} has to be a whole number, 0 to 2000; now it is merge_gap_mm, in mm",
     fileUnknown: "there is no setting {name}: there are {names}",
+    fileOldWheel: "ticks_per_m {value} was measured with the wheel before: write 0, and calibrate the new one",
     fileTwice: "{name} occurs twice",
     fileSwitched: "{name} is {value}: it has to be {range}",
     fileNumber: "{name} is {value}: it has to be a whole number, {range}",

@@ -4,7 +4,7 @@ use super::{Guide, yes_or_no};
 use anyhow::{Result, ensure};
 use frame::Results;
 use link::settings::{self, Setting, name};
-use set_up::{Task, steps};
+use set_up::Task;
 
 /// What the file and the call show before the board is asked.
 #[derive(Debug, Default)]
@@ -14,15 +14,15 @@ pub(super) struct Changes {
     /// The measures of arm, tool and servo that differ from the file's, each in a line.
     pub(super) measures: Vec<String>,
     /// The step that the user wants again.
-    pub(super) step: Option<usize>,
+    pub(super) again: Option<usize>,
 }
 
 impl Guide {
     /// Compares board, measures and settings with those of the file. Steps whose values differ are open again, and so is the
-    /// timing of the servo if arm, servo or leads are others.
-    pub(super) fn compare(&mut self, changes: Changes) -> Result<()> {
+    /// timing of the servo if the leads are others.
+    pub(super) fn compare(&mut self, changes: &Changes) -> Result<()> {
         let path = self.path.display().to_string();
-        if let Some(other) = changes.other_board {
+        if let Some(other) = &changes.other_board {
             writeln!(Results, "{path} was made for the board with {other}. This one has {}.", self.state.board())?;
             let is_same = self.ask_for("Is it the same machine, with arm and servo: yes, no", Some("no"), yes_or_no)?;
             ensure!(is_same, "give another --state, or start {path} again with --again");
@@ -32,13 +32,13 @@ impl Guide {
         self.clear_alarm()?;
         let on_board = settings::read(&mut self.link)?;
         self.state.measured.settings.clone_from(&on_board);
-        if !self.path.exists() || self.state.done.is_empty() {
+        if !self.path.exists() {
             return Ok(());
         }
         // The end switch may be the answer to an alarm just now.
         let differs = |&setting: &Setting| setting != Setting::EndSwitch && on_board.get(setting) != kept.get(setting);
         let differing: Vec<Setting> = Setting::all().filter(differs).collect();
-        if !differing.is_empty() {
+        if !differing.is_empty() && !self.state.done.is_empty() {
             writeln!(Results, "The board does not have the settings of {path}:")?;
             for &setting in &differing {
                 writeln!(Results, "  {} is {}, and was {}", name(setting), on_board.get(setting), kept.get(setting))?;
@@ -49,29 +49,11 @@ impl Guide {
             writeln!(Results, "The machine does not have the measures of {path}:")?;
             changes.measures.iter().try_for_each(|line| writeln!(Results, "  {line}"))?;
         }
-        let is_other_arm = !changes.measures.is_empty();
-        if is_other_arm || [Setting::LeadOutMs, Setting::LeadInMs].iter().any(|lead| differing.contains(lead)) {
-            // Somebody has timed another servo, or set safer leads: the kept times would put the old ones back.
+        if [Setting::LeadOutMs, Setting::LeadInMs].iter().any(|lead| differing.contains(lead)) {
+            // Another servo may have been timed, or safer leads set: the kept times would put the old leads back.
             self.state.measured.forget_timings();
         }
-        for step in steps() {
-            let is_again = changes.step == Some(step.number);
-            let is_other = |task: &Task| match task {
-                Task::Set(Setting::StemZoneMm, _) | Task::Fit("machine.tool_width_mm", _) if is_other_arm => true,
-                Task::Set(setting, _) => differing.contains(setting),
-                _ => false,
-            };
-            if is_again || step.tasks.iter().any(is_other) {
-                self.state.done.remove(&step.number);
-            }
-            for task in step.tasks.iter().filter(|_| is_again) {
-                match task {
-                    Task::TimeServo => self.state.measured.forget_timings(),
-                    Task::MeasureWheel(_) => self.state.measured.ticks_per_m.clear(),
-                    _ => {}
-                }
-            }
-        }
+        self.state.open_again(|task| matches!(task, Task::Set(setting, _) if differing.contains(setting)));
         self.keep()
     }
 

@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// The measures from which `weeder design` calculates the stroke: the key in a machine file, and the question.
-const TOOL_WIDTH: &str = "intra_row.width";
+pub(super) const TOOL_WIDTH: &str = "intra_row.width";
 const ASKED: [(&str, &str); 12] = [
     (TOOL_WIDTH, "The tool's width"),
     ("intra_row.shank_length", "The arm's length, from the servo's axis to the blade's tip"),
@@ -80,7 +80,7 @@ impl Guide {
             let value = typed.parse().ok().filter(|value| (input.least..=input.most).contains(value));
             value.ok_or_else(|| format!("it has to be a number {}", input.range()))
         })?;
-        self.state.asked.insert(name.to_owned(), value);
+        self.state.take_measure(name, value);
         self.keep()
     }
 

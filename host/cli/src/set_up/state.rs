@@ -1,10 +1,11 @@
 //! The file of a set-up: its board, completed steps, measurements, and the board's settings as they were last.
 
+use super::machine::TOOL_WIDTH;
 use anyhow::{Result, bail};
 use link::row_names::Board;
 use link::settings::{Setting, name};
 use mechanics::machine::{Input, Machine};
-use set_up::SetUp;
+use set_up::{SetUp, Task, steps};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The completed steps, the measurements, and the user's measures.
@@ -28,8 +29,17 @@ const DONE: &str = "done ";
 const ASK: &str = "machine ";
 const GET: &str = "> get";
 
-/// The sections of a machine file on which stroke and leads depend.
+/// The sections of a machine file on which the stroke depends, and the beginnings of those measures that change the servo's times.
 const SWUNG: [&str; 2] = ["intra_row", "swing"];
+const TIMED: [&str; 7] = [
+    "intra_row.blade",
+    "intra_row.servo",
+    "intra_row.shank",
+    "swing.arm",
+    "swing.least_dead",
+    "swing.most_dead",
+    "swing.servo",
+];
 
 impl State {
     pub(super) fn parse(text: &str) -> Result<Self> {
@@ -69,12 +79,35 @@ impl State {
         for Input { section, key, value, unit, .. } in machine.inputs() {
             // Conversions leave a last digit.
             let (name, value) = (format!("{section}.{key}"), (value * 1e6).round() / 1e6);
-            let before = self.asked.insert(name.clone(), value);
-            if let Some(before) = before.filter(|&before| before != value && SWUNG.contains(&section)) {
+            let before = self.take_measure(&name, value);
+            if let Some(before) = before.filter(|_| SWUNG.contains(&section)) {
                 others.push(format!("{name} is {value} {unit}, and was {before}"));
             }
         }
         others
+    }
+
+    /// Keeps a measure of the machine. Another one than before opens the steps that follow from it. Returns that one.
+    pub(super) fn take_measure(&mut self, name: &str, value: f64) -> Option<f64> {
+        let before = self.asked.insert(name.to_owned(), value).filter(|&before| before != value)?;
+        if SWUNG.iter().any(|section| name.starts_with(section)) {
+            self.open_again(|task| match task {
+                Task::Set(Setting::StemZoneMm, _) => true,
+                Task::Fit(..) => name == TOOL_WIDTH,
+                _ => false,
+            });
+        }
+        if TIMED.iter().any(|beginning| name.starts_with(beginning)) {
+            self.measured.forget_timings();
+        }
+        Some(before)
+    }
+
+    /// Opens the steps with such a task again.
+    pub(super) fn open_again(&mut self, is_other: impl Fn(&Task) -> bool) {
+        for step in steps().iter().filter(|step| step.tasks.iter().any(&is_other)) {
+            self.done.remove(&step.number);
+        }
     }
 
     /// Takes the board that is there. Returns the file's board, in words, if that is another.

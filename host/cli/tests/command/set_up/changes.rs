@@ -73,10 +73,25 @@ fn another_tool_in_the_machine_s_file_opens_its_steps_again() {
     let (folder, _uno) = set_up_before();
     fs::write(folder.path().join("wide.toml"), "[intra_row]\nwidth = \"200 mm\"\n").expect("there is room for a file");
     let said = answered(folder.path(), &["--machine", "wide.toml"], "s\ns\ns\ns\ns\ns\n");
-    for words in ["intra_row.width is 200 mm, and was 130", "Open: step 3, ", "Open: step 6, "] {
+    for words in ["intra_row.width is 200 mm, and was 130", "Open: step 3, ", "Open: step 5, "] {
         assert!(said.contains(words), "{words:?} is not in\n{said}");
     }
-    assert!(said.contains("Warning: it damages too many plants."), "{said}");
+    assert!(said.contains("Warning: that damages too many plants."), "{said}");
+}
+
+#[test]
+fn a_slower_servo_that_is_typed_is_timed_again_and_a_wider_tool_opens_its_stroke() {
+    let (folder, _uno) = set_up_before();
+    // Step 5 by typed measures: all as they are offered, and then again with another servo.
+    let measures = |servo_s: &str| format!("\n\n\n300\n20\n25\n2.5\n0.3\n40\n{servo_s}\n800\n80\n20\n15\n");
+    let first = answered(folder.path(), &[], &format!("s{}\n\n\n\n\noff\n\n190\n50\n\nq\n", measures("0.16")));
+    assert!(first.contains("(1 of 2 done)"), "{first}");
+    let kept = fs::read_to_string(folder.path().join("set-up.txt")).expect("it is there");
+    assert!(kept.contains("machine swing.servo_time_60 0.16\n"), "{kept}");
+    let second = answered(folder.path(), &["--step", "5"], &format!("s{}\n\n\n\n\n\noff\nq\n", measures("0.3")));
+    assert!(second.contains("(0 of 2 done)"), "{second}");
+    let third = answered(folder.path(), &["--step", "3"], "200\ns\ns\ns\ns\ns\n");
+    assert!(third.contains("Open: step 5, Keep the stem"), "{third}");
 }
 
 #[test]
