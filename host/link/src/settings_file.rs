@@ -317,7 +317,7 @@ mod tests {
         assert_eq!(gap("merge_gap_ticks = 40\nmerge_gap_mm = 5"), Some((Setting::MergeGapMm, 5)));
         assert!(parsed("merge_gap_ticks = 2001").unwrap_err().contains("now it is merge_gap_mm"));
         // The factory's lead of that version is left out, and another one is the user's.
-        let leads = parsed("merge_gap_ticks = 40\nlead_out_ms = 180\nlead_in_ms = 30").unwrap().settings;
+        let leads = named("merge_gap_ticks = 40\nlead_out_ms = 180\nlead_in_ms = 30").settings;
         assert_eq!(leads, [(Setting::LeadInMs, 30)]);
         let generated = "# mine\n\n# only the machine's firmware knows this setting, or this value\n# 0 to 2000 ticks\nmerge_gap_ticks = 40\n";
         let new = updated(Path::new("machine.toml"), generated, &Shown::default()).unwrap();
