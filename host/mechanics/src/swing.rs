@@ -27,7 +27,7 @@ use crate::machine::{Machine, SwingInputs};
 use crate::unit::{KG_CM, MM};
 use link::settings::{Setting, Settings, allowed_top_speed, explain, name, working_speed};
 use serde::Serialize;
-use set_up::{circle, saved_ms, stems_mm};
+use set_up::{blade_excess_mm, circle, saved_ms, stem_excess_mm};
 use uom::si::f64::{Time, Torque};
 use uom::si::time::second;
 
@@ -42,12 +42,6 @@ const FRAME_MS: f64 = 20.0;
 
 /// How far the tool that is out has to be beside the circle of the stem zone, mm.
 const BESIDE_ZONE_MM: f64 = 1.0;
-
-/// Half of a blade's length along the row, mm, for which the default margin is enough: that of the paper's blade of 45 mm.
-const BLADE_IN_DEFAULT_MM: f64 = 23.0;
-
-/// What stems may need beyond the stem zone, mm, for which the default margin is enough: as in the field `walked`.
-const STEMS_IN_DEFAULT_MM: f64 = 10.0;
 
 /// Pulses are whole steps of this, us, rounded outwards.
 const PULSE_STEP_US: f64 = 5.0;
@@ -198,9 +192,8 @@ impl Swing {
         let of_pendulum = |value: f64| if is_pendulum { value } else { 0.0 };
         let arm_margin_mm = if is_pendulum { 0.0 } else { carried_mm.ceil() };
         let blade_mm = MM.value(machine.intra_row.blade_base) / 2.0;
-        let blade_margin_mm = (blade_mm - BLADE_IN_DEFAULT_MM).max(0.0).ceil();
-        let stems_mm = if stem_zone_mm > 0.0 { stems_mm(MM.value(inputs.stem_off)) } else { 0.0 };
-        let stem_margin_mm = (stems_mm - STEMS_IN_DEFAULT_MM).max(0.0).ceil();
+        let blade_margin_mm = blade_excess_mm(2.0 * blade_mm);
+        let stem_margin_mm = if stem_zone_mm > 0.0 { stem_excess_mm(MM.value(inputs.stem_off)) } else { 0.0 };
         // The board's margin may be measured, and then it has these parts.
         let board_mm = f64::from(settings.get(Setting::MarginMm));
         let wider_mm = arm_margin_mm + blade_margin_mm + stem_margin_mm;

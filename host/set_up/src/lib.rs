@@ -71,8 +71,23 @@ const STEM_OFF: f64 = 2.0 / 11.0;
 
 /// How far the protected ground of stems that stand up to this far off their canopies' middle, mm, reaches beyond the
 /// zone, mm: as much as the margin has to cover.
-pub fn stems_mm(stem_off_mm: f64) -> f64 {
+fn stems_mm(stem_off_mm: f64) -> f64 {
     STEM_REACH * stem_off_mm
+}
+
+/// What blade and stems may need, mm, for which the default margin is enough: half of the paper's blade of 45 mm, and the stems
+/// of the field `walked`.
+const BLADE_IN_DEFAULT_MM: f64 = 23.0;
+const STEMS_IN_DEFAULT_MM: f64 = 10.0;
+
+/// How much wider than the default the margin has to be for a blade of this length along the row, mm; 0 if the default is enough.
+pub fn blade_excess_mm(blade_length_mm: f64) -> f64 {
+    (blade_length_mm / 2.0 - BLADE_IN_DEFAULT_MM).max(0.0).ceil()
+}
+
+/// The same for stems up to this far off the middle of their canopies, mm, beside a stem zone.
+pub fn stem_excess_mm(stem_off_mm: f64) -> f64 {
+    (stems_mm(stem_off_mm) - STEMS_IN_DEFAULT_MM).max(0.0).ceil()
 }
 
 /// What to do if the servo's times need too great a margin.
@@ -285,8 +300,8 @@ impl SetUp {
         if !missing.is_empty() {
             return Err(missing);
         }
-        let [beam_to_tool_mm, second_beam_mm, zone_mm, top_mm_s] =
-            [Setting::BeamToToolMm, Setting::SecondBeamMm, Setting::StemZoneMm, Setting::TopSpeedMmS]
+        let [beam_to_tool_mm, second_beam_mm, zone_mm] =
+            [Setting::BeamToToolMm, Setting::SecondBeamMm, Setting::StemZoneMm]
                 .map(|setting| f64::from(settings.get(setting)));
         let slip_mm = if second_beam_mm > 0.0 {
             // The firmware corrects each zone by the slip of the plants just before it. Only a change since then is left.
@@ -303,11 +318,7 @@ impl SetUp {
             extremes(&timings).into_iter().flatten().map(|(least_ms, greatest_ms)| greatest_ms - least_ms);
         let scatter_ms = scatters_ms.fold(SERVO_MS, u16::max);
         let speed_m_s = if keeps_stems(settings) { SLOW_M_S } else { SPEED_M_S };
-        let arm_mm = self.trailing_tool_mm.map_or(0.0, |tool_mm| {
-            let pulse_us = stroke_us(settings);
-            let rolled_mm = circle::rolled_mm(top_mm_s, travel_ms(&timings), zone_mm, self.arm.aside_mm(pulse_us));
-            self.arm.carried_by_stroke_mm(pulse_us, tool_mm.into(), zone_mm, rolled_mm)
-        });
+        let arm_mm = self.arm_mm(settings);
         let blade_mm = self.arm.blade_length_mm / 2.0;
         let margin = Margin {
             slip_mm,
@@ -335,6 +346,23 @@ impl SetUp {
                 _ => "`set ticks_per_m 0`, and measure the wheel again",
             },
         )])
+    }
+
+    /// A trailing arm's part of the margin, mm; 0 for a pendulum.
+    fn arm_mm(&self, settings: &Settings) -> f64 {
+        let Some(tool_mm) = self.trailing_tool_mm else { return 0.0 };
+        let [zone_mm, top_mm_s] =
+            [Setting::StemZoneMm, Setting::TopSpeedMmS].map(|setting| f64::from(settings.get(setting)));
+        let (pulse_us, stroke_ms) = (stroke_us(settings), travel_ms(&self.timed(settings)));
+        let rolled_mm = circle::rolled_mm(top_mm_s, stroke_ms, zone_mm, self.arm.aside_mm(pulse_us));
+        self.arm.carried_by_stroke_mm(pulse_us, tool_mm.into(), zone_mm, rolled_mm)
+    }
+
+    /// A margin that is enough before everything was measured, mm.
+    fn safe_mm(&self, settings: &Settings) -> u16 {
+        let stems_mm = if keeps_stems(settings) { stem_excess_mm(self.stem_off_mm) } else { 0.0 };
+        let excess_mm = self.arm_mm(settings).ceil() + blade_excess_mm(self.arm.blade_length_mm) + stems_mm;
+        Setting::MarginMm.default() + excess_mm as u16
     }
 
     /// Why the tasks of a step are not done with these settings. `None` if they are, or if no setting and no
@@ -381,7 +409,7 @@ impl SetUp {
     /// A warning if the margin does not cover the measured values, also if another session has set it.
     pub fn margin_warning(&self, settings: &Settings) -> Option<String> {
         let in_use_mm = settings.get(Setting::MarginMm);
-        let safe_mm = Setting::MarginMm.default();
+        let safe_mm = self.safe_mm(settings);
         match self.margin(settings) {
             Ok(margin) => (in_use_mm < margin.least_mm())
                 .then(|| format!("margin_mm {in_use_mm} is too small: the measurements need {}", margin.least_mm())),

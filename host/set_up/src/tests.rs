@@ -198,6 +198,14 @@ fn a_margin_below_the_measured_one_gives_a_warning() {
         let changes = [worst_leads(Setting::TicksPerM, 1920), vec![(Setting::MarginMm, margin_mm)]].concat();
         assert_eq!(set_up.warning(&settings(&changes)), warning);
     }
+    // A blade of 65 mm needs 10 mm more than the default margin, and stems 40 mm off the middle need as much again.
+    let mut long = heard(&[typed]);
+    (long.arm.blade_length_mm, long.stem_off_mm) = (65.0, 40.0);
+    for (zone_mm, safe_mm) in [(0, 60), (110, 70)] {
+        let warning = long.margin_warning(&settings(&[(Setting::StemZoneMm, zone_mm), (Setting::MarginMm, 59)]));
+        assert!(warning.as_ref().is_some_and(|said| said.ends_with(&format!("{safe_mm} is safe"))), "{warning:?}");
+    }
+    assert_eq!(heard(&[]).margin_warning(&settings(&[(Setting::MarginMm, 50)])), None);
 }
 
 #[test]
