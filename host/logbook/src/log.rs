@@ -431,7 +431,7 @@ mod tests {
     }
 
     #[test]
-    fn a_log_that_another_program_cuts_or_replaces_stays_readable_and_is_reported() {
+    fn a_log_cut_or_replaced_by_another_program_stays_readable() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("log.csv");
         let lost = || Happening::Lost("no port".to_owned());

@@ -80,7 +80,7 @@ fn another_tool_in_the_machine_s_file_opens_its_steps_again() {
 }
 
 #[test]
-fn a_slower_servo_that_is_typed_is_timed_again_and_a_wider_tool_opens_its_stroke() {
+fn a_slower_servo_or_wider_tool_that_is_typed_opens_its_steps() {
     let (folder, _uno) = set_up_before();
     // Step 5 by typed measures: all as they are offered, and then again with another servo.
     let measures = |servo_s: &str| format!("\n\n\n300\n20\n25\n2.5\n0.3\n40\n{servo_s}\n800\n80\n20\n15\n");
