@@ -132,7 +132,7 @@ pub struct LogWriter {
     found: u64,
     /// Lines that were written since.
     pub added: u64,
-    /// The file's end behind them, and whether another program has moved it.
+    /// The file's end behind them, and whether another program has written the file since.
     end: u64,
     is_changed: bool,
 }
@@ -164,7 +164,7 @@ impl LogWriter {
         }
         // Removes a last line that a power failure has cut off. It would damage the next line.
         let whole = end(&bytes, ENDS);
-        file.set_len(whole as u64).map_err(failed)?;
+        file.set_len(whole as u64).and_then(|()| file.seek(SeekFrom::End(0))).map_err(failed)?;
         let lines = bytes[..whole].split(|byte| ENDS.contains(byte)).filter(|line| !line.is_empty());
         let found = lines.count().saturating_sub(1) as u64;
         let saved = file.try_clone().map_err(failed)?;
@@ -259,9 +259,10 @@ impl LogWriter {
 
     /// Writes at the file's end.
     fn write_at(&mut self, end: u64, bytes: &[u8]) -> io::Result<()> {
-        self.file.write_all(bytes)?;
-        self.end = end + bytes.len() as u64;
-        Ok(())
+        let written = self.file.write_all(bytes);
+        // A full disk may have taken a part: that is no change by another program.
+        self.end = self.file.stream_position().unwrap_or(end + bytes.len() as u64);
+        written
     }
 
     /// Whether the file still has its name.
@@ -458,6 +459,16 @@ mod tests {
         log.write(0, &lost()).unwrap();
         let refused = log.check().unwrap_err();
         assert!(refused.to_string().contains("moved, deleted or replaced"), "{refused}");
+    }
+
+    #[test]
+    fn a_heading_without_its_end_is_written_again() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        for begun in [HEADER.to_owned(), format!("\u{feff}{HEADER}"), format!("{HEADER}\n0,lost,no po")] {
+            fs::write(file.path(), begun).unwrap();
+            LogWriter::open(file.path()).unwrap().write(0, &Happening::Lost("no port".to_owned())).unwrap();
+            assert_eq!(fs::read_to_string(file.path()).unwrap(), format!("{HEADER}\n0,lost,no port\n"));
+        }
     }
 
     #[test]

@@ -63,7 +63,8 @@ const SLOW_M_S: f64 = 1.0 / 3.6;
 
 /// How far a stem's protected ground reaches beyond its zone, as a share of the stem's distance from the middle of its
 /// canopy. The zone has room for half of the distance on each side, so the other half is left. Hardly any stem stands at the
-/// full distance: with this share, fewer than 1 plant in 10,000 is damaged.
+/// full distance. In the field `walked` no plant is damaged with this share (below 0.014 %), and 0.03 % where stems stand 40
+/// or 50 mm off: `weeder trial --field FILE --speeds 1 --spacings 50,60 --replications 100`.
 const STEM_REACH: f64 = 0.484;
 
 /// The least of these distances that is assumed, as a share of the zone: 20 of 110 mm in the field `walked`.

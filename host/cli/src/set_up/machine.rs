@@ -1,6 +1,6 @@
 //! The measures of arm, tool and servo, asked or from a machine's file, and what `weeder design` calculates from them.
 
-use super::state::State;
+use super::state::{State, TOOL_WIDTH};
 use super::{Guide, yes_or_no};
 use anyhow::Result;
 use frame::{Messages, Results};
@@ -15,7 +15,6 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// The measures from which `weeder design` calculates the stroke: the key in a machine file, and the question.
-pub(super) const TOOL_WIDTH: &str = "intra_row.width";
 const ASKED: [(&str, &str); 12] = [
     (TOOL_WIDTH, "The tool's width"),
     ("intra_row.shank_length", "The arm's length, from the servo's axis to the blade's tip"),

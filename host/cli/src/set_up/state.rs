@@ -1,6 +1,5 @@
 //! The file of a set-up: its board, completed steps, measurements, and the board's settings as they were last.
 
-use super::machine::TOOL_WIDTH;
 use anyhow::{Result, bail};
 use link::row_names::Board;
 use link::settings::{Setting, name};
@@ -28,6 +27,9 @@ const BOARD: &str = "board ";
 const DONE: &str = "done ";
 const ASK: &str = "machine ";
 const GET: &str = "> get";
+
+/// The tool's width, as a machine file names it.
+pub(super) const TOOL_WIDTH: &str = "intra_row.width";
 
 /// The sections of a machine file on which the stroke depends, and the beginnings of those measures that change the servo's times.
 const SWUNG: [&str; 2] = ["intra_row", "swing"];

@@ -29,18 +29,13 @@ fn lines_with(change: impl Fn(&str) -> Option<String>) -> Vec<String> {
 
 #[test]
 fn a_second_beam_limits_the_speed_by_its_distance_to_the_tool() {
-    let with = |changes: &[(Setting, u16)]| {
-        let mut settings = Settings::new();
-        changes.iter().for_each(|&(setting, value)| settings.set(setting, value).expect("it is in its range"));
-        settings
-    };
-    let beam = |second_beam_mm| with(&[(Setting::SecondBeamMm, second_beam_mm)]);
+    let beam = |second_beam_mm| settings(&[(Setting::SecondBeamMm, second_beam_mm)]);
     assert_eq!(working_speed(&beam(0)), None);
     // Within nine eighths of 230 ms, the response and a millisecond.
     assert_eq!(working_speed(&beam(200)), Some((1000.0 * 199.0 / 260.0) as u16));
     assert_eq!(working_speed(&beam(72)), Some((1000.0 * (400.0 - 72.0 - 1.0) / 260.0) as u16));
     let lead = [(Setting::SecondBeamMm, 72), (Setting::MarginMm, 150), (Setting::LeadOutMs, 0)];
-    assert_eq!(working_speed(&with(&lead)), Some(u16::MAX));
+    assert_eq!(working_speed(&settings(&lead)), Some(u16::MAX));
 }
 
 #[test]
