@@ -19,6 +19,7 @@ use std::collections::BTreeMap;
 use std::ffi::CString;
 use std::fmt::Write as _;
 use std::path::Path;
+use std::thread;
 
 /// How long each program runs, and with how many kinds of input.
 const CYCLES: u64 = 4_000_000;
@@ -247,7 +248,14 @@ fn measured_values_never_exceed_proved_bounds() {
     programs::expect_in_readme("measured", &table);
 }
 
-/// The results for a program in which an instruction was replaced by `nop`.
+/// The result of a proof for a program in which an instruction was replaced by `nop`.
+enum Found {
+    Refused,
+    Changed,
+    Unnoticed,
+}
+
+/// How many of the programs had each result.
 #[derive(Default)]
 struct Tally {
     refused: usize,
@@ -258,22 +266,16 @@ struct Tally {
 #[test]
 fn faults_that_are_put_in_are_found() {
     let mut tallies: BTreeMap<&str, Tally> = BTreeMap::new();
-    for Sample { name, elf, chip, facts } in samples() {
-        let budgets: Budgets = toml::from_str(&facts).expect("the facts are whole");
-        let mut program = Program::read(&elf, chip).unwrap_or_else(|error| panic!("{name}: {error}"));
-        let Ok(whole) = prove(&program, &budgets) else { continue };
-        for (kind, places) in faults(&program, &whole) {
-            let before: Vec<[u8; 2]> = places.iter().map(|&at| [program.flash[at], program.flash[at + 1]]).collect();
-            places.iter().for_each(|&at| program.flash[at..at + 2].fill(0));
-            let tally = tallies.entry(kind).or_default();
-            match prove(&program, &budgets) {
-                Err(_) => tally.refused += 1,
-                Ok(bounds) if bounds != whole => tally.changed += 1,
-                Ok(_) => tally.unnoticed += 1,
-            }
-            for (&at, bytes) in places.iter().zip(before) {
-                program.flash[at..at + 2].copy_from_slice(&bytes);
-            }
+    let results: Vec<_> = thread::scope(|scope| {
+        let threads: Vec<_> = samples().into_iter().map(|sample| scope.spawn(move || put_in_faults(&sample))).collect();
+        threads.into_iter().flat_map(|thread| thread.join().expect("its asserts hold")).collect()
+    });
+    for (kind, result) in results {
+        let tally = tallies.entry(kind).or_default();
+        match result {
+            Found::Refused => tally.refused += 1,
+            Found::Changed => tally.changed += 1,
+            Found::Unnoticed => tally.unnoticed += 1,
         }
     }
     let mut table =
@@ -296,6 +298,26 @@ fn faults_that_are_put_in_are_found() {
         assert!(tally.unnoticed * 50 <= tally.refused, "{kind}: {} of {} unnoticed", tally.unnoticed, tally.refused);
     }
     programs::expect_in_readme("faults", &table);
+}
+
+/// The proof's result for each copy of a program with a fault.
+fn put_in_faults(Sample { name, elf, chip, facts }: &Sample) -> Vec<(&'static str, Found)> {
+    let budgets: Budgets = toml::from_str(facts).expect("the facts are whole");
+    let mut program = Program::read(elf, *chip).unwrap_or_else(|error| panic!("{name}: {error}"));
+    let Ok(whole) = prove(&program, &budgets) else { return Vec::new() };
+    let mut found = Vec::new();
+    for (kind, places) in faults(&program, &whole) {
+        let before = program.flash.clone();
+        places.iter().for_each(|&at| program.flash[at..at + 2].fill(0));
+        let result = match prove(&program, &budgets) {
+            Err(_) => Found::Refused,
+            Ok(bounds) if bounds != whole => Found::Changed,
+            Ok(_) => Found::Unnoticed,
+        };
+        found.push((kind, result));
+        program.flash = before;
+    }
+    found
 }
 
 /// Faults of every kind in a program, up to four of each, by the addresses of the removed instructions.
