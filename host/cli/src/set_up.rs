@@ -54,7 +54,7 @@ pub struct Arguments {
     /// Start again at the first step, and forget the measurements.
     #[arg(long)]
     again: bool,
-    /// Do this step again, 1 to 8: 3 with another tool, 5 with another arm, 6 with another servo, 7 with another wheel.
+    /// Do this step again, 1 to 8; docs/set-up.md says which after another part.
     #[arg(long, value_name = "N", value_parser = whole_within(1..=steps().len()), conflicts_with = "again")]
     step: Option<usize>,
     /// Do the steps on the simulated machine, and print what each of them brings.
