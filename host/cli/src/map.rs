@@ -1,7 +1,7 @@
 //! `weeder map`: shows logs with a satellite receiver on a map, and summarises them.
 
 use crate::receiver::AntennaArguments;
-use anyhow::Result;
+use anyhow::{Result, bail};
 use clap::Args;
 use comfy_table::{Table, presets};
 use field::counted;
@@ -10,8 +10,10 @@ use frame::{Messages, OutName, Replace, Results, number_within, source};
 use gps::summary::{Stand, Summary};
 use gps::wheel::Ratio;
 use gps::{Job, Wanted, map, picture};
-use logbook::log::{self, Kind};
+use logbook::log::{self, Entry, Kind};
 use serde_json::json;
+use std::collections::HashMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -64,9 +66,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let stand = Stand { row_spacing_mm: arguments.row_spacing, spacing_mm: arguments.spacing };
     let over = |antenna| arguments.antenna.over(antenna);
     let wanted = Wanted { antenna: &over, longest_outage_m: arguments.longest_outage };
-    let (mut jobs, mut has_receiver) = (Vec::new(), false);
+    let (mut jobs, mut has_receiver, mut contents) = (Vec::new(), false, HashMap::new());
     for path in &arguments.logs {
         let log = log::read(path)?;
+        let is_work = log.iter().any(|entry| entry.kind == Kind::Status);
+        if let Some(other) = contents.insert(hash(&log), path).filter(|_| is_work) {
+            bail!("{} and {} have the same lines: name each record once", other.display(), path.display());
+        }
         has_receiver |= log.iter().any(|entry| matches!(entry.kind, Kind::GpsFound | Kind::Gps | Kind::GpsDamaged));
         let (name, job) = (name(path, &arguments.logs), Job::read(&log, &wanted));
         if job.without_wheel > 0 {
@@ -115,6 +121,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     printed
 }
 
+/// A number for the content of a record.
+fn hash(log: &[Entry]) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    log.hash(&mut hasher);
+    hasher.finish()
+}
+
 /// What is wrong with a record, and what would be right.
 fn problems(summary: &Summary) -> Vec<String> {
     let mut problems = Vec::new();
@@ -127,7 +140,7 @@ fn problems(summary: &Summary) -> Vec<String> {
     }
     if summary.wheel_spun_m > 0.0 {
         problems.push(format!(
-            "the wheel rolled {:.1} m on the spot: see `wheel_spun` on the map, and press the wheel to the ground",
+            "the wheel rolled {:.1} m on the spot, which ground and area contain: see `wheel_spun` on the map, and press the wheel to the ground",
             summary.wheel_spun_m
         ));
     }

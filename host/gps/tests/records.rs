@@ -251,6 +251,7 @@ fn a_change_of_the_wheel_begins_a_new_stretch() {
 fn a_change_of_wheel_and_its_revert_each_begin_a_stretch() {
     let mut log = whole();
     let set = vec![
+        (Kind::Setting, "ticks_per_rev=2400"),
         (Kind::Command, "set wheel_mm 410"),
         (Kind::Answer, "ok"),
         (Kind::Command, "revert"),

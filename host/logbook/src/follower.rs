@@ -187,8 +187,9 @@ impl Follower {
             Kind::Connected | Kind::Lost => {
                 (self.unanswered, self.distance) = (VecDeque::new(), Distance::default());
                 if entry.kind == Kind::Connected {
-                    // The settings follow. A log of an earlier version lacks those that came later.
+                    // The settings follow. A log of an earlier version lacks those that came later, but has the wheel.
                     self.in_use = InUse::factory();
+                    self.in_use.unknown.extend(Setting::all().filter(|setting| setting.is_of_the_wheel()));
                 }
                 Followed::Linked
             }

@@ -19,7 +19,7 @@ use strum::{EnumString, IntoStaticStr, VariantNames};
 use thiserror::Error;
 
 /// The kind of a line in a log.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, EnumString, IntoStaticStr, VariantNames)]
 #[strum(serialize_all = "snake_case")]
 pub enum Kind {
     /// The Uno is connected; the version.
@@ -52,6 +52,13 @@ pub enum Kind {
     GpsDamaged,
     /// A fault in the receiver's fixes.
     GpsMark,
+}
+
+impl Kind {
+    /// Whether a log that is continued may go on with such a line. Its clock then begins again.
+    fn may_begin(self) -> bool {
+        matches!(self, Self::Connected | Self::Started | Self::Lost | Self::Antenna | Self::GpsFound | Self::GpsLost)
+    }
 }
 
 pub(crate) const HEADER: &str = "time_ms,kind,line";
@@ -286,7 +293,7 @@ impl LogWriter {
 }
 
 /// A line of a log.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Entry {
     /// The line in the file, counted from 1.
     pub number: u64,
@@ -313,14 +320,21 @@ pub fn read(path: &Path) -> Result<Vec<Entry>, FileError> {
 pub fn parse(path: &Path, mut text: Vec<u8>) -> Result<Vec<Entry>, FileError> {
     text.truncate(end(&text, ENDS));
     let table = CsvTable::parse(path, text, &HEADER.split(',').collect::<Vec<_>>())?;
+    let mut last_ms = 0;
     table
         .lines()
         .map(|line| {
-            let kind = line.text("kind").parse().map_err(|_| {
+            let kind: Kind = line.text("kind").parse().map_err(|_| {
                 let known = Kind::VARIANTS.join(", ");
                 line.error(format!("kind is `{}`: it has to be one of {known}", line.text("kind")))
             })?;
             let time_ms = line.value("time_ms", "a whole number of milliseconds")?;
+            if time_ms < last_ms && !kind.may_begin() {
+                let why =
+                    format!("time_ms goes back from {last_ms} to {time_ms}: lines have to stand as they were recorded");
+                return Err(line.error(why));
+            }
+            last_ms = time_ms;
             Ok(Entry { number: line.number, time_ms, kind, text: line.text("line").to_owned() })
         })
         .collect()

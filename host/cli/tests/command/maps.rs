@@ -31,3 +31,42 @@ fn advice_differs_for_no_fix_and_for_no_receiver() {
         assert!(output.status.success() && said.contains(advice), "{said}");
     }
 }
+
+#[test]
+fn a_record_that_was_sorted_or_named_twice_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let lines =
+        ["0,connected,0.2.0", "0,setting,ticks_per_m=2000", "100,status,state=work pos=0", "150,event,state is=hold"];
+    let save = |name: &str, lines: &[&str]| {
+        fs::write(folder.path().join(name), format!("time_ms,kind,line\n{}\n", lines.join("\n"))).unwrap();
+    };
+    save("log.csv", &lines);
+    fs::copy(folder.path().join("log.csv"), folder.path().join("log (1).csv")).unwrap();
+    // As a table that a spreadsheet has sorted by its second column.
+    save("sorted.csv", &[lines[0], lines[3], lines[1], lines[2]]);
+    // A record that was continued.
+    save("two days.csv", &[&lines[..], &lines[..]].concat());
+    for (logs, refusal) in [
+        (&["log.csv", "two days.csv"][..], None),
+        (&["sorted.csv"], Some("sorted.csv, line 4: time_ms goes back from 150 to 0")),
+        (&["log.csv", "log (1).csv"], Some("log.csv and log (1).csv have the same lines")),
+    ] {
+        let output = weeder(folder.path(), &[&["map", "-o", "map.geojson", "--force"], logs].concat());
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.success(), refusal.is_none(), "{said}");
+        assert!(said.contains(refusal.unwrap_or_default()), "{said}");
+    }
+}
+
+#[test]
+fn without_the_machine_s_settings_nothing_is_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let status = |ms: u32| format!("{ms},status,state=work tool=in pos={} speed_mm_s=0 windows=0 unseen_mm=0", ms);
+    let log: String = (1..20).map(|second| status(100 * second) + "\n").collect();
+    fs::write(folder.path().join("log.csv"), format!("time_ms,kind,line\n0,connected,0.2.0\n{log}")).unwrap();
+    let output = weeder(folder.path(), &["map", "log.csv", "-o", "map.geojson", "--json"]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let counted: serde_json::Value = serde_json::from_slice(&output.stdout).expect("it is JSON");
+    assert_eq!(counted[0]["count"]["worked_m"], 0.0);
+    assert!(said.contains("the log lacks the settings"), "{said}");
+}
