@@ -294,6 +294,29 @@ fn ground_covered_again_counts_once_unless_in_another_row() {
 }
 
 #[test]
+fn a_damaged_position_adds_no_ground() {
+    let log = whole();
+    let worked = |log: &[Entry]| {
+        let summary = Summary::of(&Job::read(log, &Wanted::default()), &Stand { row_spacing_mm: 500.0, spacing_mm: None });
+        [summary.worked_m, summary.weeded_m]
+    };
+    let [worked_m, weeded_m] = worked(&log);
+    for at in (0..log.len()).step_by(7) {
+        let Some((before, position)) = log[at].text.split_once(" pos=") else { continue };
+        let (position, behind) = position.split_once(' ').unwrap_or((position, ""));
+        for by in [1_000_000, 100_000, -100_000] {
+            let mut log = log.clone();
+            let damaged = position.parse::<i32>().expect("it is a number") + by;
+            log[at].text = format!("{before} pos={damaged} {behind}");
+            let [found_m, found_weeded_m] = worked(&log);
+            // At most the ground between the statuses around it is unknown, and that up to a swing.
+            assert!((-0.5..0.1).contains(&(found_m - worked_m)), "{}: {by}: {found_m} of {worked_m}", log[at].text);
+            assert!((-0.5..0.1).contains(&(found_weeded_m - weeded_m)), "{}: {by}: {found_weeded_m}", log[at].text);
+        }
+    }
+}
+
+#[test]
 fn plants_that_a_start_sees_again_count_once_and_another_row_for_itself() {
     // Half metres. A plant of 350 mm stands every metre, one of them in the beam at each start. The machine is drawn
     // back in hold.

@@ -108,11 +108,13 @@ impl Reading {
         self.last_status = Some(status);
     }
 
-    /// Ends the ground before a gap that ends here.
-    fn leave_gap(&mut self, to: &Rolled) {
-        if let Some(from) = self.wheel.last().copied().filter(|from| Self::is_gap(from, to)) {
+    /// Ends the ground before a gap that ends here. Returns whether one does.
+    fn leave_gap(&mut self, to: &Rolled) -> bool {
+        let from = self.wheel.last().copied().filter(|from| Self::is_gap(from, to));
+        if let Some(from) = from {
             self.turn_to(Did::Rolled, from.m, from.time_ms as u64);
         }
+        from.is_some()
     }
 
     /// From this distance on the ground gets another kind of work.
@@ -153,7 +155,11 @@ impl Reading {
                 let is_at_work = self.last_status.as_ref().is_some_and(|status| status.mode == Mode::Work)
                     || self.ground.last().is_some_and(|passed| passed.did != Did::Rolled);
                 if let Some(at_m) = metres(position).filter(|_| is_at_work) {
-                    self.leave_gap(&Rolled { time_ms: entry.time_ms as f64, m: at_m, line: entry.number });
+                    let here = Rolled { time_ms: entry.time_ms as f64, m: at_m, line: entry.number };
+                    if self.leave_gap(&here) {
+                        // So the next status ends no gap again, and leaves the ground that begins here.
+                        self.wheel.push(here);
+                    }
                     self.turn_to(if out { Did::Spared } else { Did::Weeded }, at_m, entry.time_ms);
                 }
                 (if out { EventKind::SwingOut } else { EventKind::SwingIn }, position, 0.0)
