@@ -119,8 +119,9 @@ fn write_report(
 
 /// The whole analysis. Without a model, `no_model` says why.
 fn in_json(analysis: &Analysis) -> Value {
-    let plot = |record: &PlotRecord| json!({ "record": record, "performance": record.performance() });
-    let plots: Vec<Value> = analysis.records.iter().map(plot).collect();
+    // The level joins a plot with its treatment: its own speed may be a measured one.
+    let plot = |(record, level): (&PlotRecord, &f64)| json!({ "record": record, "speed_level_km_h": level, "performance": record.performance() });
+    let plots: Vec<Value> = analysis.records.iter().zip(&analysis.levels_km_h).map(plot).collect();
     let responses: Vec<Value> = analysis.responses.iter().map(response_in_json).collect();
     json!({
         "findings": analysis.findings(),

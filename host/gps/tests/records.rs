@@ -297,7 +297,8 @@ fn ground_covered_again_counts_once_unless_in_another_row() {
 fn a_damaged_position_adds_no_ground() {
     let log = whole();
     let worked = |log: &[Entry]| {
-        let summary = Summary::of(&Job::read(log, &Wanted::default()), &Stand { row_spacing_mm: 500.0, spacing_mm: None });
+        let summary =
+            Summary::of(&Job::read(log, &Wanted::default()), &Stand { row_spacing_mm: 500.0, spacing_mm: None });
         [summary.worked_m, summary.weeded_m]
     };
     let [worked_m, weeded_m] = worked(&log);

@@ -159,12 +159,13 @@ impl ResponseAnalysis {
         let model = is_measured.and_then(|()| LinearModel::fit(&design, &values));
         let counts: Vec<(u32, u32)> = records().filter_map(|record| response.count(record)).collect();
         let binomial = || is_measured.and_then(|()| BinomialModel::fit(&design, &counts));
+        let numbers: Vec<u32> = records().map(|record| record.plot).collect();
         let extreme = |pick: fn(f64, f64) -> f64| values.iter().copied().reduce(pick);
         Self {
             response,
-            numbers: records().map(|record| record.plot).collect(),
             range: extreme(f64::min).zip(extreme(f64::max)),
-            checks: model.as_ref().ok().map(|model| Checks::of(&design, &values, model)),
+            checks: model.as_ref().ok().map(|model| Checks::of(&design, &values, model, &numbers)),
+            numbers,
             model,
             binomial: response.is_counted().then(binomial),
             variance: is_measured.and_then(|()| AnalysisOfVariance::of(&design, &values)),

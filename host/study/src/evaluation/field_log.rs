@@ -122,8 +122,7 @@ pub fn join(records: &mut [PlotRecord], stretches: &[Worked], plots: &[u32]) -> 
         }
         let of_log = OfLog::of(record, &parts);
         let m2 = |width_m: f64| of_log.distance_m.map(|m| m * width_m).filter(|m2| *m2 > 0.0);
-        // More digits would only seem to be measured.
-        record.speed_km_h = of_log.speed_km_h.map_or(record.speed_km_h, |km_h| (km_h * 1000.0).round() / 1000.0);
+        record.speed_km_h = of_log.speed_km_h.unwrap_or(record.speed_km_h);
         record.time_s = record.time_s.or(of_log.time_s.filter(|time_s| *time_s > 0.0));
         record.plants = record.plants.or(of_log.plants.filter(|_| of_log.too_few_plants().is_none()));
         record.area_m2 = record.area_m2.or_else(|| m2(record.width_m?));

@@ -105,7 +105,13 @@ impl Analysis {
         let share = self.damage();
         let Share { count, of, .. } = share;
         if of == 0 {
-            return "Damaged plants were counted in no plot.".to_owned();
+            let is_counted = self.records.iter().any(|plot| plot.damaged.is_some() && plot.plants.is_some());
+            let which = if is_counted {
+                "No plot with counted plants had any."
+            } else {
+                "Damaged plants were counted in no plot."
+            };
+            return which.to_owned();
         }
         if count == 0 {
             return format!("None of {of} plants was damaged: {share} % ({}).", share.kind());
@@ -209,7 +215,7 @@ impl ResponseAnalysis {
 
     /// The findings of the residuals, a sentence each.
     pub fn checked(&self) -> Vec<String> {
-        self.checks.as_ref().map(|checks| checks.sentences(self.response.title(), &self.numbers)).unwrap_or_default()
+        self.checks.as_ref().map(|checks| checks.sentences(self.response.title())).unwrap_or_default()
     }
 }
 

@@ -32,13 +32,13 @@ pub struct Checks {
     pub lack_of_fit_p: Option<f64>,
     /// How probable scatter as unequal is by chance.
     pub unequal_scatter_p: Option<f64>,
-    /// The plots that are farthest off, numbered from 0, and their p-value among this many plots. Several are equally far.
-    pub farthest: Option<(Vec<usize>, f64)>,
+    /// The numbers of the plots that are farthest off, and their p-value among this many plots. Several are equally far.
+    pub farthest: Option<(Vec<u32>, f64)>,
 }
 
 impl Checks {
-    /// The checks of a model of these values in this design.
-    pub fn of(design: &Design, values: &[f64], model: &LinearModel) -> Self {
+    /// The checks of a model of these values in this design. `plots` has the number of each plot.
+    pub fn of(design: &Design, values: &[f64], model: &LinearModel, plots: &[u32]) -> Self {
         // A model that fits exactly has no residuals.
         if model.terms.iter().any(|term| term.p.is_none()) {
             return Self::default();
@@ -46,12 +46,12 @@ impl Checks {
         Self {
             lack_of_fit_p: lack_of_fit(design, values, model),
             unequal_scatter_p: unequal_scatter(design, model),
-            farthest: farthest(design, model),
+            farthest: farthest(design, model, plots),
         }
     }
 
-    /// The findings, a sentence each. `name` is the measure's, and `plots` has the number of each plot.
-    pub fn sentences(&self, name: &str, plots: &[u32]) -> Vec<String> {
+    /// The findings, a sentence each. `name` is the measure's.
+    pub fn sentences(&self, name: &str) -> Vec<String> {
         let mut said = Vec::new();
         let found = |p: Option<f64>| p.filter(|p| *p < SIGNIFICANCE).map(probability);
         if let Some(p) = found(self.lack_of_fit_p) {
@@ -67,7 +67,7 @@ impl Checks {
         if let Some((farthest, p)) = &self.farthest
             && let Some(p) = found(Some(*p))
         {
-            let numbers: Vec<f64> = farthest.iter().map(|&plot| f64::from(plots[plot])).collect();
+            let numbers: Vec<f64> = farthest.iter().copied().map(f64::from).collect();
             said.push(match numbers.as_slice() {
                 [one] => format!(
                     "{name}: plot {one} is farther from the model than chance explains ({p}): check what happened there."
@@ -115,7 +115,7 @@ fn unequal_scatter(design: &Design, model: &LinearModel) -> Option<f64> {
     Some(ChiSquared::new((of_squares.terms.len() - 1) as f64).ok()?.sf(statistic))
 }
 
-fn farthest(design: &Design, model: &LinearModel) -> Option<(Vec<usize>, f64)> {
+fn farthest(design: &Design, model: &LinearModel, plots: &[u32]) -> Option<(Vec<u32>, f64)> {
     /// Parts and differences below this share are rounding.
     const ROUNDING: f64 = 1e-9;
     let (columns, _) = design.columns().ok()?;
@@ -133,7 +133,7 @@ fn farthest(design: &Design, model: &LinearModel) -> Option<(Vec<usize>, f64)> {
     });
     let of_plots: Vec<(usize, f64)> = of_plots.collect();
     let t = of_plots.iter().map(|(_, t)| *t).max_by(f64::total_cmp)?;
-    let plots = of_plots.iter().filter(|(_, other)| *other >= t * (1.0 - ROUNDING)).map(|(plot, _)| *plot).collect();
+    let farthest = of_plots.iter().filter(|(_, other)| *other >= t * (1.0 - ROUNDING));
     let alone = 2.0 * StudentsT::new(0.0, 1.0, freedom).ok()?.sf(t);
-    Some((plots, (alone * design.plots() as f64).min(1.0)))
+    Some((farthest.map(|(plot, _)| plots[*plot]).collect(), (alone * design.plots() as f64).min(1.0)))
 }

@@ -131,7 +131,7 @@ pub enum NoModel {
     #[error("the calculation did not converge; this is no statement about the plots")]
     NotSolved,
     /// No plot has the measure.
-    #[error("no plot has it: something that it needs was not counted or measured")]
+    #[error("no plot has it: something that it needs is 0, or was not counted or measured")]
     NotMeasured,
 }
 
