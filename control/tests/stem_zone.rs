@@ -80,10 +80,14 @@ fn narrow_gaps_belong_to_a_plant_and_wide_gaps_keep_the_full_width() {
 }
 
 #[test]
-fn a_cut_detection_is_kept_from_end_to_end() {
-    let mut rolling = along(vec![(-50.0, 100.0)]);
-    rolling.roll_to(1400.0, 300.0);
-    assert!((rolling.kept_mm(0.0).1 - 100.0).abs() < TOLERANCE_MM, "{:?}", rolling.kept_mm(0.0));
+fn a_cut_detection_has_half_of_the_zone_behind_its_end() {
+    // A plant that the start has cut, and a stalk that begins within the merging gap behind the start.
+    for (from_mm, to_mm) in [(-50.0, 100.0), (10.0, 14.0)] {
+        let mut rolling = along(vec![(from_mm, to_mm)]);
+        rolling.roll_to(1400.0, 300.0);
+        let kept_to_mm = rolling.kept_mm(0.0).1;
+        assert!((kept_to_mm - to_mm - ZONE_MM / 2.0).abs() < TOLERANCE_MM, "{from_mm}: {kept_to_mm}");
+    }
 }
 
 #[test]

@@ -229,3 +229,17 @@ fn forgotten_ground_stays_closed_over_any_distance_rolled_back() {
         }
     }
 }
+
+#[test]
+fn a_stalk_close_behind_unseen_ground_keeps_its_stem_zone() {
+    for (gap_mm, width_mm) in [(1, 4), (10, 4), (60, 4), (60, 30), (80, 12)] {
+        let row = [(300 + gap_mm, width_mm), (900, 0)];
+        let lines = "set top_speed_mm_s 700
+            set merge_gap_mm 82
+            set stem_zone_mm 90
+            roll 300 mm at 556 mm/s
+            start
+            roll 1200 mm at 300 mm/s";
+        go(&run(&row, lines));
+    }
+}
