@@ -87,10 +87,6 @@ export function makeButton(className: string, use: () => void, text = ""): HTMLB
     return button;
 }
 
-export function set(element: Element, attributes: Readonly<Record<string, string | number>>): void {
-    for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, String(value));
-}
-
 /** A new element of a picture with attributes and children. */
 export function draw<Name extends keyof SVGElementTagNameMap>(
     name: Name,
@@ -98,7 +94,7 @@ export function draw<Name extends keyof SVGElementTagNameMap>(
     ...children: (Node | string)[]
 ): SVGElementTagNameMap[Name] {
     const element = document.createElementNS("http://www.w3.org/2000/svg", name);
-    set(element, attributes);
+    for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, String(value));
     element.append(...children);
     return element;
 }

@@ -65,7 +65,7 @@ page.say("unchecked", () => say("unchecked"));
 /** The row's seed: another row at each visit, or that of an address with `?seed=7`. */
 const seed = Number(new URLSearchParams(location.search).get("seed"));
 const simulation = new Simulation(hex, Number.isSafeInteger(seed) && seed > 0 ? seed : Date.now(), true);
-const drawing = new Drawing(page.get("drawing", SVGSVGElement), simulation);
+const drawing = new Drawing(page.get("drawing", SVGSVGElement));
 const tryPanel = new Panel(page.html("try-panel"), "try");
 /** The chip's time. Timeouts use it, so that a slow or paused simulation causes no timeout. */
 const chipMs = () => (simulation.uno.cycle / CYCLES_PER_SECOND) * 1000;
