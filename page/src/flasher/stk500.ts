@@ -3,7 +3,7 @@
 // A command ends with CRC_EOP. Its answer begins with INSYNC and ends with OK. The bootloader listens for a second or
 // two after a reset. Addresses are in words. Optiboot and its predecessor erase each page before they write it.
 
-import { after, wait } from "../clock.ts";
+import { wait } from "../clock.ts";
 import type { PortError, SerialLine } from "../link/serial.ts";
 import { english, type Plain } from "../words/words.ts";
 
@@ -207,13 +207,10 @@ export class Bootloader {
             if (this.#gone) throw this.#gone;
             const left = by - performance.now();
             if (left <= 0) return undefined;
-            await new Promise<void>((done) => {
-                const stop = after(left, done);
-                this.#arrived = () => {
-                    stop();
-                    done();
-                };
+            const arrived = new Promise<void>((done) => {
+                this.#arrived = done;
             });
+            await Promise.race([arrived, wait(left)]);
         }
     }
 }
