@@ -50,18 +50,13 @@ type Message = (About & { machine: number }) | { is: "beat" | "dropped" | "held"
 
 /** Sends a request. It fails with `NoMachine` at its time limit, or when `gone` aborts. Returns the status and the body. */
 async function send(path: string, limitMs: number, request: RequestInit = {}, gone?: AbortSignal) {
-    const limit = new AbortController();
-    const give = () => limit.abort();
-    const timer = setTimeout(give, limitMs);
-    gone?.addEventListener("abort", give);
+    const limit = AbortSignal.timeout(limitMs);
+    const signal = gone ? AbortSignal.any([limit, gone]) : limit;
     try {
-        const answer = await fetch(path, { ...request, signal: limit.signal });
+        const answer = await fetch(path, { ...request, signal });
         return { status: answer.status, isOk: answer.ok, text: await answer.text() };
     } catch {
         throw gone?.aborted ? gone.reason : new NoMachine(SILENT);
-    } finally {
-        clearTimeout(timer);
-        gone?.removeEventListener("abort", give);
     }
 }
 
