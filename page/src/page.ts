@@ -12,7 +12,7 @@ import { Connection } from "./panel/connection.ts";
 import { Panel } from "./panel/panel.ts";
 import { showServed } from "./panel/served.ts";
 import { chosen, isStill, keep, STILL_MS } from "./preferences.ts";
-import { Cancelled, type Work } from "./record/picture.ts";
+import type { Work } from "./record/picture.ts";
 import { RecordView } from "./record/record.ts";
 import type { Change } from "./row/machine.ts";
 import { isOn, isWaiting, turn, wakeOnTouch } from "./signals.ts";
@@ -95,7 +95,7 @@ new RecordView(new Parts(page.html("view-record")), tryLog);
 /** The log of "Try it", which weeds on until some plants are in it. */
 async function tryLog({ progress, cancel }: Work): Promise<File> {
     for (;;) {
-        if (cancel.aborted) throw new Cancelled();
+        cancel.throwIfAborted();
         const share = simulation.machine.toolMm / EXAMPLE_MM;
         progress(Math.min(Math.max(share, 0), 1));
         // A machine that stands makes the log no longer.
