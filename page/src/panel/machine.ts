@@ -42,7 +42,7 @@ export class Machine {
     version: string | undefined;
     mayStart = true;
     /** Why it is lost, in English. */
-    #lost: string = english("noneConnected");
+    lost: string = english("noneConnected");
     /** Whether it may be weeding without a connection. */
     #mayWeedOn = false;
     /** The last known ones. */
@@ -163,11 +163,6 @@ export class Machine {
         return status.position + this.ticks((status.speedMmS * Math.min(nowMs - this.statusMs, 500)) / 1000);
     }
 
-    /** Why it is lost, in English. What it may do without a connection stays. */
-    set lost(why: string) {
-        this.#lost = why;
-    }
-
     /** Whether it is connected and works, as far as it has told. */
     get isAtWork(): boolean {
         return this.version !== undefined && this.mode === "work";
@@ -209,7 +204,7 @@ export class Machine {
 
     get #reason(): string {
         if (this.version === undefined)
-            return `${sentence(told(this.#lost))}${this.#mayWeedOn ? ` ${say("weedsOn")}` : ""}`;
+            return `${sentence(told(this.lost))}${this.#mayWeedOn ? ` ${say("weedsOn")}` : ""}`;
         if (this.state === "unknown") return say("notTold");
         if (this.mode === "alarm") return say("outUntilCleared");
         if (this.mode === "hold" && !this.toolOut) return say("movedByHand");
