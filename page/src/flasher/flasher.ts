@@ -31,7 +31,7 @@ export class Flasher {
         const choice = parts.get("board", HTMLSelectElement);
         for (const { id, name } of BOARDS) {
             const option = new Option("", id);
-            show(option, () => (typeof name === "string" ? name : say(name.text)));
+            show(option, () => name ?? say("oldBoard"));
             choice.append(option);
         }
         const last = BOARDS.find(({ id }) => id === chosen("board"));
