@@ -191,17 +191,13 @@ for (const changed of ["resize", "scroll"])
         document.documentElement.style.setProperty("--keyboard", `${covered}px`);
     });
 
-/** Light or dark as in the system, or always light, for sunlight. */
+/** Light or dark as in the system, or always light, for sunlight: the style looks at the button. */
 const light = page.button("light", () => {
     const on = light.ariaPressed !== "true";
     keep("light", on ? "on" : "off");
-    lighten(on);
-});
-function lighten(on: boolean): void {
     light.ariaPressed = String(on);
-    document.documentElement.classList.toggle("light", on);
-}
-lighten(chosen("light") === "on");
+});
+light.ariaPressed = String(chosen("light") === "on");
 
 const sound = page.button("sound", () => {
     turn(!isOn());
