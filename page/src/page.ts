@@ -50,7 +50,7 @@ const page = new Parts(document.body, "id");
 
 translate(document.body);
 inLanguage(() => {
-    document.documentElement.lang = language();
+    document.documentElement.lang = language;
 });
 const languages = page.get("language", HTMLSelectElement);
 for (const [code, { name }] of Object.entries(LANGUAGES)) {
@@ -58,7 +58,7 @@ for (const [code, { name }] of Object.entries(LANGUAGES)) {
     option.lang = code;
     languages.append(option);
 }
-languages.value = language();
+languages.value = language;
 languages.addEventListener("change", () => speak(languages.value as Code));
 page.say("unchecked", () => say("unchecked"));
 

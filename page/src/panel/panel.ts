@@ -313,7 +313,7 @@ export class Panel {
         } catch (error) {
             const { message } = error as Error;
             const text = told(message);
-            if (text !== message) answered.lang = language();
+            if (text !== message) answered.lang = language;
             this.#parts.write("answered", text);
             // The console has no line of what was not sent.
             if (error instanceof NotSent) this.#console.add(`${line}: ${message}`, "error");

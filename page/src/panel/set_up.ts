@@ -76,7 +76,7 @@ export class SetUp {
         const { steps, next, missing, marginMm, warning } = this.#rust.ask<Advice>({ setUp: { lines, settings } });
         this.#marginMm = marginMm;
         // Built once for each language, because the operator may be typing.
-        if (this.#language !== language()) this.#build(steps);
+        if (this.#language !== language) this.#build(steps);
         for (const [name, input] of this.#inputs)
             if (input.dataset.typed === undefined) input.value = String(this.machine.setting(name));
         let done = 0;
@@ -98,7 +98,7 @@ export class SetUp {
     }
 
     #build(steps: Advice["steps"]): void {
-        this.#language = language();
+        this.#language = language;
         this.#inputs.clear();
         this.#marks = steps.map((manual, at) => (manual.isShown ? make("p", "aside") : this.#box(at)));
         this.parts.html("set-up-steps").replaceChildren(

@@ -54,18 +54,16 @@ function preferred(): Code {
     return languages.map(base).find(isCode) ?? "en";
 }
 
-let code: Code = preferred();
+export let language: Code = preferred();
 /** Its table. */
-export let table: Language = LANGUAGES[code];
+export let table: Language = LANGUAGES[language];
 const changes: (() => void)[] = [];
 const formats = new Map<string, Intl.NumberFormat>();
-
-export const language = (): Code => code;
 
 /** Chooses a language, and writes all texts again that are not updated continuously. */
 export function speak(chosen: Code): void {
     keep("language", chosen);
-    [code, table] = [chosen, LANGUAGES[chosen]];
+    [language, table] = [chosen, LANGUAGES[chosen]];
     formats.clear();
     for (const change of changes) change();
 }
@@ -87,7 +85,7 @@ function format(options: Intl.NumberFormatOptions): Intl.NumberFormat {
     let found = formats.get(key);
     if (!found) {
         const { languages = [] } = globalThis.navigator ?? {};
-        const locale = languages.find((locale) => base(locale) === code) ?? code;
+        const locale = languages.find((locale) => base(locale) === language) ?? language;
         found = new Intl.NumberFormat(locale, options);
         formats.set(key, found);
     }
@@ -114,7 +112,7 @@ export function quantity(value: number, unit: string, digits = 0): string {
 /** A text with its holes filled, in the form for `count`. */
 function fill(text: string, holes: Readonly<Record<string, string | number>> = {}): string {
     const forms = text.split("|");
-    const isOne = forms.length > 1 && new Intl.PluralRules(code).select(Number(holes.count)) === "one";
+    const isOne = forms.length > 1 && new Intl.PluralRules(language).select(Number(holes.count)) === "one";
     const form = (isOne ? forms[0] : forms.at(-1)) ?? text;
     return form.replaceAll(/\{(\w+)\}/g, (_, hole: string) => {
         const value = holes[hole] ?? "";
@@ -154,7 +152,7 @@ export const reason = (error: unknown): string => (error instanceof Error ? erro
 /** Translates such a text or an error's, with its values. Unknown text stays: the machine itself speaks English. */
 export function told(english: unknown): string {
     const text = reason(english);
-    if (code === "en") return text;
+    if (language === "en") return text;
     // A number within such a text.
     const [, decimals] = /^\d+\.(\d+)$/.exec(text) ?? [];
     if (decimals) return number(Number(text), decimals.length);
