@@ -100,10 +100,10 @@ export function draw<Name extends keyof SVGElementTagNameMap>(
 }
 
 /** Hands the operator a file. */
-export function download(name: string, text: string, type: string): void {
-    const link = document.createElement("a");
-    link.href = URL.createObjectURL(new Blob([text], { type }));
-    link.download = name;
+export function download(file: File): void {
+    const link = make("a", "");
+    link.href = URL.createObjectURL(file);
+    link.download = file.name;
     link.click();
     // The download has begun by then, also where the browser asks first.
     setTimeout(() => URL.revokeObjectURL(link.href), 60_000);

@@ -45,7 +45,7 @@ export class Flasher {
             keep("board", choice.value);
             warn();
         });
-        parts.button("hex", () => download("weeder.hex", hex, "text/plain"));
+        parts.button("hex", () => download(new File([hex], "weeder.hex", { type: "text/plain" })));
         parts.button("to-work", () => this.#flashed && this.onWork(this.#flashed));
         const why = whyNoSerial();
         const start = parts.button("flash", () => void this.#start(choice.value));

@@ -83,7 +83,7 @@ export class Panel {
         const why = (error: unknown) => sentence(told(error));
         for (const command of ["start", "clear"])
             parts.button(command, () => void parts.attempt("drive-said", ask(command), undefined, why));
-        const save = () => download("weeder-log.csv", this.#log.text(), "text/csv");
+        const save = () => download(this.log);
         parts.button("log-save", save);
         parts.button("log-clear", () => {
             if (this.#log.isUnsaved) save();
