@@ -92,21 +92,16 @@ function format(options: Intl.NumberFormatOptions): Intl.NumberFormat {
     return found;
 }
 
-/** A number with this number of decimal places. */
-export function number(value: number, digits = 0): string {
-    return format(digitsOf(digits)).format(value);
+/** A number with this number of decimal places, and in the given style. */
+export function number(value: number, digits = 0, style: Intl.NumberFormatOptions = {}): string {
+    const places = { minimumFractionDigits: digits, maximumFractionDigits: digits };
+    // Rounding a small negative number gives no negative 0.
+    return format({ ...style, ...places, signDisplay: "negative" }).format(value);
 }
-
-/** These decimal places. Rounding a small negative number gives no negative 0. */
-const digitsOf = (digits: number): Intl.NumberFormatOptions => ({
-    minimumFractionDigits: digits,
-    maximumFractionDigits: digits,
-    signDisplay: "negative",
-});
 
 /** A number with its unit, by the unit's name in `Intl.NumberFormat`. */
 export function quantity(value: number, unit: string, digits = 0): string {
-    return format({ style: "unit", unit, ...digitsOf(digits) }).format(value);
+    return number(value, digits, { style: "unit", unit });
 }
 
 /** A text with its holes filled, in the form for `count`. */
