@@ -9,6 +9,8 @@ import { readHex, usedBytes } from "../uno/hex.ts";
 import { english, quantity, say, show, told } from "../words/words.ts";
 import { BOARDS, type Board, Bootloader, FlashError, PAGE_BYTES, type Progress } from "./stk500.ts";
 
+const PHASES = { waiting: "phaseWaiting", writing: "phaseWriting", verifying: "phaseVerifying" } as const;
+
 export class Flasher {
     /** Called before a port is opened for flashing. The owner of the port must close it. */
     onBegin: (port: SerialPort) => Promise<void> = async () => {};
@@ -122,13 +124,7 @@ export class Flasher {
         this.parts.html("progress").hidden = false;
         if (phase === "waiting") bar.removeAttribute("value");
         else bar.value = share;
-        const percent = { share: quantity(share * 100, "percent") };
-        this.parts.write(
-            "phase",
-            phase === "waiting"
-                ? say("phaseWaiting")
-                : say(phase === "writing" ? "phaseWriting" : "phaseVerifying", percent),
-        );
+        this.parts.write("phase", say(PHASES[phase], { share: quantity(share * 100, "percent") }));
     }
 
     #say(kind: "done" | "failed" | "", text: () => string): void {
