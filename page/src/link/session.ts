@@ -122,12 +122,6 @@ export function tell(news: News, onHappening: (happening: Happening) => void): v
     }
 }
 
-/** Why no weeder answers, and what the reason is about. */
-interface Failure {
-    readonly is: "noText" | "nothingAnswers" | "otherDevice" | "resetWhileAsked";
-    readonly about: string;
-}
-
 /** What a turn has led to. A failure ends the session. */
 interface Turn {
     readonly news: readonly (
@@ -138,7 +132,8 @@ interface Turn {
         | { is: "unanswered"; number: number; why: "late" | "held" | "notTyped" | "unknown"; because: string | null }
     )[];
     readonly send: string;
-    readonly failure: Failure | null;
+    /** Why no weeder answers, and what the reason is about. */
+    readonly failure: { is: "noText" | "nothingAnswers" | "otherDevice" | "resetWhileAsked"; about: string } | null;
 }
 
 export class Session implements Link {
@@ -286,7 +281,7 @@ export class Session implements Link {
 }
 
 /** Why no weeder answers: on a page the remedies are other ones than those of the command. */
-function whyNone({ is, about }: Failure): string {
+function whyNone({ is, about }: NonNullable<Turn["failure"]>): string {
     if (is === "otherDevice") return english(is, { text: about });
     return is === "resetWhileAsked" ? english(is, { command: about }) : english(is);
 }
