@@ -74,14 +74,14 @@ export class Chip {
     readonly usart: AVRUSART;
     /** Whether the watchdog has run out: the chip stands still until it is replaced. */
     watchdogRanOut = false;
-    readonly #cpu: CPU;
+    readonly cpu: CPU;
     #until = 0;
     #isAsleep = false;
 
     /** Starts with these memories, after this cause, at this cycle. */
     constructor(program: Uint16Array, sram: Uint8Array, eeprom: EEPROMBackend, cause: ResetCause, cycle: number) {
         const cpu = new CPU(program, SRAM_BYTES);
-        this.#cpu = cpu;
+        this.cpu = cpu;
         cpu.cycles = cycle;
         cpu.data.set(sram, SRAM_START);
         cpu.data[MCUSR] = RESET_CAUSES[cause];
@@ -111,17 +111,13 @@ export class Chip {
         found?.port.setPin(found.bit, high);
     }
 
-    get cycle(): number {
-        return this.#cpu.cycles;
-    }
-
     get sram(): Uint8Array {
-        return this.#cpu.data.slice(SRAM_START);
+        return this.cpu.data.slice(SRAM_START);
     }
 
     /** Runs to the end of the instruction at `cycle`, or until the watchdog runs out. */
     run(cycle: number): void {
-        const cpu = this.#cpu;
+        const cpu = this.cpu;
         const program = cpu.progMem;
         this.#until = cycle;
         while (cpu.cycles < this.#until) {
@@ -149,14 +145,9 @@ export class Chip {
 
     /** Lets the time pass to the next event of a peripheral, unless an interrupt is waiting. */
     #skipToEvent(): void {
-        const cpu = this.#cpu;
+        const cpu = this.cpu;
         if (cpu.nextInterrupt >= 0 && cpu.interruptsEnabled) return;
         cpu.cycles = Math.max(cpu.cycles, Math.min(this.#until, nextEvent(cpu)));
-    }
-
-    /** Calls `happen` after this number of cycles, unless a reset comes before. */
-    after(cycles: number, happen: () => void): void {
-        this.#cpu.addClockEvent(happen, cycles);
     }
 
     /**
@@ -165,6 +156,6 @@ export class Chip {
      * once.
      */
     get takesByte(): boolean {
-        return this.#cpu.interruptsEnabled && !((this.#cpu.data[UCSR0A] ?? 0) & RXC0);
+        return this.cpu.interruptsEnabled && !((this.cpu.data[UCSR0A] ?? 0) & RXC0);
     }
 }
