@@ -87,7 +87,6 @@ export function makeButton(className: string, use: () => void, text = ""): HTMLB
     return button;
 }
 
-/** A new element of a picture with attributes and children. */
 export function draw<Name extends keyof SVGElementTagNameMap>(
     name: Name,
     attributes: Readonly<Record<string, string | number>>,
@@ -99,7 +98,6 @@ export function draw<Name extends keyof SVGElementTagNameMap>(
     return element;
 }
 
-/** Hands the operator a file. */
 export function download(file: File): void {
     const link = make("a", "");
     link.href = URL.createObjectURL(file);

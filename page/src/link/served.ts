@@ -13,7 +13,6 @@ import { type Happening, type Link, type News, NoMachine, NotSent, Refused, tell
 
 /** Silence after which the computer counts as lost: it sends a message twice a second. */
 const SILENCE_MS = 3000;
-/** Time between two tries to reach it. */
 const RETRY_MS = 2000;
 /** Time limit of a HOLD, and of a question about the computer. The page then tries again. */
 const SHORT_MS = 1500;
@@ -30,7 +29,6 @@ export interface Allowed {
     readonly mayChange: boolean;
 }
 
-/** The result of a HOLD to all machines. */
 export interface HeldAll {
     /** Each machine, and why it has not obeyed. */
     readonly machines: readonly { readonly name: string; readonly error: string | null }[];
@@ -43,7 +41,6 @@ export function isServed(): boolean {
     return new URLSearchParams(location.search).has("served");
 }
 
-/** News of a machine. */
 type About = News | { is: "lost"; why: string; isWanted?: boolean };
 
 type Message = (About & { machine: number }) | { is: "beat" | "dropped" | "held" };
@@ -70,7 +67,6 @@ export class Served {
     /** The number of the last message. */
     #seen = "";
 
-    /** Asks the computer for its machines. */
     static async open(): Promise<Served> {
         const { isOk, text } = await send("/machines", LONG_MS);
         if (!isOk) throw new Error(text);
@@ -114,7 +110,6 @@ export class Served {
         return JSON.parse(text) as HeldAll;
     }
 
-    /** Checks whether the computer has fallen silent. */
     watch(): void {
         if (this.#events && performance.now() - this.#heardMs > SILENCE_MS) this.#lose(SILENT);
     }
@@ -191,7 +186,6 @@ export class ServedMachine implements Link {
         await this.#type("hold", SHORT_MS);
     }
 
-    /** Takes the computer's news of it. */
     tell(message: About): void {
         if (message.is === "lost") {
             this.#lose(message.why, message.isWanted);

@@ -7,7 +7,6 @@ import { read, tickMm } from "../link/grammar.ts";
 import type { Happening } from "../link/session.ts";
 import { ended, english, type Plain, quantity, say, table, told } from "../words/words.ts";
 
-/** Objects that are remembered. */
 const OBJECTS = 50;
 
 /**
@@ -52,7 +51,6 @@ export class Machine {
     restarted: string | undefined;
     /** The present time, as `statusMs`. */
     nowMs = 0;
-    /** The latched alarm's name. */
     alarm: string | undefined;
     warning: string | undefined;
     status: Line<"status"> | undefined;
@@ -64,7 +62,6 @@ export class Machine {
     objects: Line<"detection">[] = [];
     zones: Line<"detection">[] = [];
 
-    /** Takes an event at a time. */
     take(happening: Happening, nowMs: number): void {
         switch (happening.is) {
             case "connected":

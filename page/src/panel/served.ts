@@ -7,7 +7,6 @@ import { ended, inLanguage, quantity, say, show, told } from "../words/words.ts"
 import { fault } from "./machine.ts";
 import { Panel, TURN_MS } from "./panel.ts";
 
-/** Fills an element with the machines' panels, and returns these. */
 export async function showServed(into: HTMLElement): Promise<Panel[]> {
     const served = await Served.open();
     const all = make("section", "overview stack");

@@ -9,7 +9,6 @@ import { Rust } from "../rust.ts";
 import { ended, language, type Plain, quantity, say, show, table, told } from "../words/words.ts";
 import type { Machine } from "./machine.ts";
 
-/** The results of the session for the steps. */
 interface Advice {
     readonly steps: readonly {
         readonly title: string;
@@ -22,7 +21,6 @@ interface Advice {
     }[];
     /** The next step; null before the first measurement. */
     readonly next: string | null;
-    /** The missing measurements for the margin. */
     readonly missing: readonly string[];
     readonly marginMm: number | null;
     readonly warning: string | null;

@@ -39,7 +39,6 @@ export interface Problem {
     readonly problem: string;
 }
 
-/** The Rust's answer. */
 interface Head {
     readonly lengthMm: number;
     readonly timeMs: number;
@@ -67,7 +66,6 @@ export class Table<Columns extends readonly string[]> {
         return this.values.length / this.columns.length;
     }
 
-    /** The rows on this ground. */
     near(fromMm: number, toMm: number): Row<Columns>[] {
         const { values, columns, first, end } = this;
         const rows: Row<Columns>[] = [];
@@ -83,7 +81,6 @@ export class Table<Columns extends readonly string[]> {
         return rows;
     }
 
-    /** The row that begins nearest to a position. */
     nearest(placeMm: number): Row<Columns> {
         const awayMm = (row: number) => Math.abs((this.values[row + this.first] ?? 0) - placeMm);
         let best = 0;

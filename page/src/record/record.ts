@@ -38,7 +38,6 @@ const CLASSES = ["canopy", "weed", "canopy unknown"];
 /** The legend of the map: see host/gps/src/picture.rs. */
 const MAP_LEGEND = ["mapWeeded", "mapLeft", "plant", "mapKept", "legendWeed", "mapLabel", "mapAlarm"] as const;
 
-/** A log that is shown. */
 interface Row {
     readonly file: File;
     readonly picture: Picture;

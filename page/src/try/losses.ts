@@ -24,7 +24,6 @@ const PARTS = {
 } as const;
 type Part = keyof typeof PARTS;
 
-/** Why a plant was not kept. */
 const NOT_KEPT = { unseen: "notKeptUnseen", off: "notKeptOff", late: "notKeptLate" } as const;
 export type NotKept = keyof typeof NOT_KEPT;
 

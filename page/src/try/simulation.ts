@@ -22,7 +22,6 @@ export class Simulation {
     readonly machine: Machine;
     readonly outcome = new Outcome();
     readonly losses: Losses;
-    /** Called with the firmware's output. */
     onText: (text: string) => void = () => {};
     /** Keep-out zones at the tool or ahead of it, from the firmware's output. */
     zones: Zone[] = [];
@@ -56,7 +55,6 @@ export class Simulation {
         return (uno.cycle - begin) / CYCLES_PER_SECOND;
     }
 
-    /** Throws the work switch. */
     work(on: boolean): void {
         this.uno.set(PIN.workSwitch, !on);
     }

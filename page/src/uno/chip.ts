@@ -27,7 +27,6 @@ import {
 } from "avr8js";
 import { addTimer } from "./timer.ts";
 
-/** Cycles of the Uno's clock in a second. */
 export const CYCLES_PER_SECOND = 16_000_000;
 
 /** Bytes of the chip's memories. */
@@ -48,7 +47,6 @@ const RXC0 = 0x80;
 /** SMCR: sleep is enabled. */
 const SE = 0x01;
 
-/** Start address of SRAM in the data space. */
 const SRAM_START = 0x100;
 
 /** Half of the write time of a byte in the EEPROM: 3.4 ms in all (data sheet, table 8-1). */
@@ -105,7 +103,6 @@ export class Chip {
         };
     }
 
-    /** Sets the external level of a pin. */
     set(pin: number, high: boolean): void {
         const found = this.pins[pin];
         found?.port.setPin(found.bit, high);

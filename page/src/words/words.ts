@@ -14,11 +14,9 @@ export type Word = keyof typeof en.words;
 export type Plain = { [Key in Word]: [Holes<(typeof en.words)[Key]>] extends [never] ? Key : never }[Word];
 type HeardWord = keyof typeof en.heard;
 
-/** A language's table. */
 export interface Language {
     /** Its own name for itself. */
     readonly name: string;
-    /** The texts of the page. */
     readonly words: Readonly<Record<Word, string>>;
     /** Texts that stay English until they are shown. */
     readonly heard: Readonly<Record<HeardWord, string>>;
@@ -34,7 +32,6 @@ export interface Language {
 type Holes<Text extends string> = Text extends `${string}{${infer Hole}}${infer Rest}` ? Hole | Holes<Rest> : never;
 
 const { hi, es, fr } = translations;
-/** The languages. */
 export const LANGUAGES = { en, hi, es, fr } as const satisfies Readonly<Record<string, Language>>;
 export type Code = keyof typeof LANGUAGES;
 
@@ -55,7 +52,6 @@ function preferred(): Code {
 }
 
 export let language: Code = preferred();
-/** Its table. */
 export let table: Language = LANGUAGES[language];
 const changes: (() => void)[] = [];
 const formats = new Map<string, Intl.NumberFormat>();
@@ -115,7 +111,6 @@ function fill(text: string, holes: Readonly<Record<string, string | number>> = {
     });
 }
 
-/** A text of the page. */
 export function say<Key extends Word>(word: Key, ...[holes]: Filling<(typeof en.words)[Key]>): string {
     return fill(table.words[word], holes);
 }
@@ -141,7 +136,6 @@ export function ended(text: string): string {
     return /[.!?।]$/.test(text) ? text : text + stop;
 }
 
-/** The text of an error. */
 export const reason = (error: unknown): string => (error instanceof Error ? error.message : String(error));
 
 /** Translates such a text or an error's, with its values. Unknown text stays: the machine itself speaks English. */
