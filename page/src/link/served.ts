@@ -123,12 +123,8 @@ export class Served {
         if (!this.#events) return;
         this.#events.close();
         this.#events = undefined;
-        this.#tellLost(why, isWanted);
-        setTimeout(() => void this.#again(), RETRY_MS);
-    }
-
-    #tellLost(why: string, isWanted = false): void {
         for (const machine of this.machines) machine.tell({ is: "lost", why, isWanted });
+        setTimeout(() => void this.#again(), RETRY_MS);
     }
 
     async #again(): Promise<void> {
@@ -137,8 +133,10 @@ export class Served {
         const isOther = answer?.status === 401 || (answer?.isOk && answer.text !== this.text);
         // Some browsers would not ask before they drop a log.
         if (isOther && !this.mayReload()) {
-            for (const machine of this.machines) machine.isOther = true;
-            this.#tellLost(english("servedOther"));
+            for (const machine of this.machines) {
+                machine.isOther = true;
+                machine.tell({ is: "lost", why: english("servedOther") });
+            }
         } else if (isOther) location.reload();
         else if (answer?.isOk && !this.#isBehind) this.listen();
         else setTimeout(() => void this.#again(), RETRY_MS);
@@ -187,12 +185,9 @@ export class ServedMachine implements Link {
     }
 
     tell(message: About): void {
-        if (message.is === "lost") {
-            this.#lose(message.why, message.isWanted);
-            return;
-        }
         if (message.is === "there") this.#there = new AbortController();
-        tell(message, (happening) => this.onHappening(happening));
+        if (message.is === "lost") this.#lose(message.why, message.isWanted);
+        else tell(message, (happening) => this.onHappening(happening));
     }
 
     #lose(why: string, isWanted = false): void {
