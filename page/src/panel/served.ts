@@ -26,7 +26,7 @@ export async function showServed(into: HTMLElement): Promise<Panel[]> {
     };
     const showAll = names.length > 1 ? overview(all, names, holdAll) : undefined;
     if (showAll) into.append(all);
-    const shown = served.machines.map((machine, number) => {
+    for (const [number, machine] of served.machines.entries()) {
         const { name } = machine;
         const element = make("div", showAll ? "panel stack" : "panel stack alone");
         const section = make("section", "served stack", make("h2", "", name), element);
@@ -41,9 +41,8 @@ export async function showServed(into: HTMLElement): Promise<Panel[]> {
         machine.onAbsent = (why) => {
             panel.machine.lost = why;
         };
-        return panel;
-    });
-    panels.push(...shown);
+        panels.push(panel);
+    }
     served.mayReload = () => !panels.some(({ isNeeded }) => isNeeded);
     setInterval(() => {
         served.watch();
