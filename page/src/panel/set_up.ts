@@ -163,24 +163,21 @@ export class SetUp {
      * of a step can be worse than none.
      */
     async #save(names: readonly string[]): Promise<void> {
-        const typed = names.flatMap((name) => {
-            const input = this.#inputs.get(name);
-            return input?.dataset.typed === undefined ? [] : [{ name, input }];
-        });
+        const typed = [...this.#inputs].filter(([name, { dataset }]) => names.includes(name) && "typed" in dataset);
         // The machine says what would be right.
-        const wrong = typed.find(({ name, input }) => {
+        const wrong = typed.find(([name, input]) => {
             const setting = this.machine.settings.find((setting) => setting.name === name);
             const value = /^\d+$/.test(input.value) ? Number(input.value) : Number.NaN;
             return setting && !(setting.least <= value && value <= setting.greatest);
         });
-        if (wrong) await this.ask(`set ${wrong.name} ${wrong.input.value}`);
-        const wanted = new Map(typed.map(({ name, input }) => [name, Number(input.value)]));
+        if (wrong) await this.ask(`set ${wrong[0]} ${wrong[1].value}`);
+        const wanted = new Map(typed.map(([name, input]) => [name, Number(input.value)]));
         const { contradiction, steps } = order(this.machine.settings, wanted);
         // Settings that already contradict each other are corrected one at a time.
         const isContradicted = order(this.machine.settings, new Map()).contradiction !== undefined;
         if (contradiction && !isContradicted) throw new Error(contradiction);
         for (const [name, value] of contradiction ? wanted : steps) await this.ask(`set ${name} ${value}`);
-        for (const { input } of typed) delete input.dataset.typed;
+        for (const [, input] of typed) delete input.dataset.typed;
         await this.ask("save");
     }
 }
