@@ -39,8 +39,8 @@ export class Flasher {
         const last = BOARDS.find(({ id }) => id === chosen("board"));
         if (last) choice.value = last.id;
         const warn = () => {
-            const isOld = BOARDS.some(({ id, isOld }) => isOld && id === choice.value);
-            parts.say("board-said", () => (isOld ? say("oldBootloader") : ""));
+            const board = BOARDS[choice.selectedIndex];
+            parts.say("board-said", () => (board?.isOld ? say("oldBootloader") : ""));
         };
         warn();
         choice.addEventListener("change", () => {
@@ -50,7 +50,7 @@ export class Flasher {
         parts.button("hex", () => download(new File([hex], "weeder.hex", { type: "text/plain" })));
         parts.button("to-work", () => this.#flashed && this.onWork(this.#flashed));
         const why = whyNoSerial();
-        const start = parts.button("flash", () => void this.#start(choice.value));
+        const start = parts.button("flash", () => void this.#start(BOARDS[choice.selectedIndex]));
         start.disabled = why !== undefined;
         parts.say("no-serial", () => told(why ?? ""));
         globalThis.addEventListener("beforeunload", (event) => {
@@ -61,8 +61,7 @@ export class Flasher {
         });
     }
 
-    async #start(id: string): Promise<void> {
-        const board = BOARDS.find((board) => board.id === id);
+    async #start(board: Board | undefined): Promise<void> {
         if (!board || this.#isBusy) return;
         this.#isBusy = true;
         const flash = this.parts.get("flash", HTMLButtonElement);
