@@ -111,7 +111,6 @@ export class Machine {
             case "event":
                 this.#take(happening.event);
                 break;
-            default:
         }
     }
 
@@ -132,7 +131,6 @@ export class Machine {
             case "alarm":
                 [this.mode, this.toolOut, this.alarm, this.zones] = ["alarm", true, event.alarm, []];
                 break;
-            default:
         }
     }
 
