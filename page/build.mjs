@@ -47,23 +47,23 @@ function rust() {
     return join(target, "wasm32-unknown-unknown/page/page.wasm");
 }
 
-/** The translations as a file: each table by its language. */
-function translations() {
-    const names = readdirSync("src/words").filter((name) => name.endsWith(".json"));
-    const tables = names.map((name) => [
-        basename(name, ".json"),
-        JSON.parse(readFileSync(`src/words/${name}`, "utf8")),
-    ]);
-    writeFileSync("build/languages.json", JSON.stringify(Object.fromEntries(tables)));
-    return "build/languages.json";
+/** Writes a file for esbuild, and returns its path. */
+function built(/** @type {string} */ name, /** @type {string | Buffer} */ content) {
+    const path = resolve("build", name);
+    writeFileSync(path, content);
+    return path;
 }
 
 /** Compresses a file into a file; src/core.ts decompresses it. */
-function packed(/** @type {string} */ path) {
-    const to = join("build", `${basename(path)}.deflated`);
-    writeFileSync(to, deflateRawSync(readFileSync(path), { level: 9 }));
-    return resolve(to);
-}
+const packed = (/** @type {string} */ path) =>
+    built(`${basename(path)}.deflated`, deflateRawSync(readFileSync(path), { level: 9 }));
+
+/** The translations: each table by its language. */
+const languages = Object.fromEntries(
+    readdirSync("src/words")
+        .filter((name) => name.endsWith(".json"))
+        .map((name) => [basename(name, ".json"), JSON.parse(readFileSync(`src/words/${name}`, "utf8"))]),
+);
 
 /**
  * The worker that reads logs, as a file. A page opened from the disk can only start a worker whose code is inside the
@@ -79,9 +79,7 @@ async function logWorker() {
 function faults() {
     const manual = readFileSync("../docs/faults.md", "utf8");
     const rows = manual.matchAll(/^\| `((?:\d-\d )?(\w+))`[^|]*\| ([^|]*) \|$/gm);
-    const faults = [...rows].map(([, title, name, advice]) => ({ name, title, advice }));
-    writeFileSync("build/faults.json", JSON.stringify(faults));
-    return resolve("build/faults.json");
+    return built("faults.json", JSON.stringify([...rows].map(([, title, name, advice]) => ({ name, title, advice }))));
 }
 
 /** The page's HTML without its indentation, with the English texts instead of their names behind `$`. */
@@ -89,8 +87,7 @@ async function html() {
     const { code } = await transform(readFileSync("src/words/en.ts"), { loader: "ts" });
     const { words } = await import(`data:text/javascript,${encodeURIComponent(code)}`);
     // Shown in every language, because no code has chosen one.
-    const others = Object.values(JSON.parse(readFileSync(translations(), "utf8")));
-    words.notStarted = [words, ...others.map(({ words }) => words)].map(({ notStarted }) => notStarted).join(" / ");
+    words.notStarted = [{ words }, ...Object.values(languages)].map(({ words }) => words.notStarted).join(" / ");
     const source = readFileSync("src/index.html", "utf8").replaceAll(/\n +/g, "\n");
     return source.replaceAll(/\$(\w+)/g, (_, name) => {
         if (words[name] === undefined) throw new Error(`src/words/en.ts lacks the text ${name} of src/index.html`);
@@ -124,7 +121,7 @@ const common = {
     alias: {
         "firmware.deflated": packed(firmware()),
         "rust.deflated": packed(rust()),
-        "languages.deflated": packed(translations()),
+        "languages.deflated": packed(built("languages.json", JSON.stringify(languages))),
         "log-worker.js": await logWorker(),
         "faults.json": faults(),
     },
@@ -149,17 +146,16 @@ if (what === "page") {
         define: { ...common.define, BUILD: '"{BUILD}"' },
         write: false,
     });
-    const built = Object.fromEntries(outputFiles.map(({ path, text }) => [basename(path), text]));
-    for (const name of ["manifest.webmanifest", "icon.svg"]) built[name] = readFileSync(join("src/app", name), "utf8");
-    built["index.html"] = await html();
+    const parts = Object.fromEntries(outputFiles.map(({ path, text }) => [basename(path), text]));
+    for (const name of ["manifest.webmanifest", "icon.svg"]) parts[name] = readFileSync(join("src/app", name), "utf8");
+    parts["index.html"] = await html();
     // The build's name is the hash of the files without it.
-    const name = hashOf(Object.entries(built).sort().join()).slice(0, 16);
+    const name = hashOf(Object.entries(parts).sort().join()).slice(0, 16);
     // What the worker stores: by its address, the hash of its content, and its media type.
     const files = Object.entries(MEDIA).map(([file, media]) => {
-        const content = (built[file] ?? "").replaceAll("{BUILD}", name);
+        const content = (parts[file] ?? "").replaceAll("{BUILD}", name);
         writeFileSync(join("dist", file), content);
-        const address =
-            { "index.html": "./", "page.css": `page.css?${name}`, "page.js": `page.js?${name}` }[file] ?? file;
+        const address = file === "index.html" ? "./" : file.startsWith("page.") ? `${file}?${name}` : file;
         return [address, { hash: hashOf(content), media }];
     });
     const define = { BUILD: JSON.stringify(name), FILES: JSON.stringify(Object.fromEntries(files)) };

@@ -7,21 +7,15 @@ const waiting = new Map<number, () => void>();
 let count = 0;
 let worker: Worker | undefined;
 
-function call(id: number): void {
-    waiting.get(id)?.();
-    waiting.delete(id);
-}
-
-/** Calls `done` after this time. Returns a function that prevents it. */
-export function after(ms: number, done: () => void): () => void {
-    const id = count++;
-    waiting.set(id, done);
+export function wait(ms: number): Promise<void> {
     if (!worker) {
         worker = new Worker(URL.createObjectURL(new Blob([CODE], { type: "text/javascript" })));
-        worker.addEventListener("message", ({ data }) => call(data));
+        worker.addEventListener("message", ({ data }) => {
+            waiting.get(data)?.();
+            waiting.delete(data);
+        });
     }
+    const id = count++;
     worker.postMessage([id, ms]);
-    return () => void waiting.delete(id);
+    return new Promise((done) => waiting.set(id, done));
 }
-
-export const wait = (ms: number): Promise<void> => new Promise((done) => void after(ms, done));

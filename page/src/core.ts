@@ -8,9 +8,7 @@ import { Rust } from "./rust.ts";
 
 /** The Rust's module: for workers, and for further instances with their own state. */
 export let module: WebAssembly.Module;
-/** The firmware as a HEX file. */
 export let hex = "";
-/** The table of each translation. */
 export let translations: {
     readonly hi: typeof import("./words/hi.json");
     readonly es: typeof import("./words/es.json");

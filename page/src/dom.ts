@@ -87,27 +87,21 @@ export function makeButton(className: string, use: () => void, text = ""): HTMLB
     return button;
 }
 
-export function set(element: Element, attributes: Readonly<Record<string, string | number>>): void {
-    for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, String(value));
-}
-
-/** A new element of a picture with attributes and children. */
 export function draw<Name extends keyof SVGElementTagNameMap>(
     name: Name,
     attributes: Readonly<Record<string, string | number>>,
     ...children: (Node | string)[]
 ): SVGElementTagNameMap[Name] {
     const element = document.createElementNS("http://www.w3.org/2000/svg", name);
-    set(element, attributes);
+    for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, String(value));
     element.append(...children);
     return element;
 }
 
-/** Hands the operator a file. */
-export function download(name: string, text: string, type: string): void {
-    const link = document.createElement("a");
-    link.href = URL.createObjectURL(new Blob([text], { type }));
-    link.download = name;
+export function download(file: File): void {
+    const link = make("a", "");
+    link.href = URL.createObjectURL(file);
+    link.download = file.name;
     link.click();
     // The download has begun by then, also where the browser asks first.
     setTimeout(() => URL.revokeObjectURL(link.href), 60_000);

@@ -12,7 +12,7 @@ import { Connection } from "./panel/connection.ts";
 import { Panel } from "./panel/panel.ts";
 import { showServed } from "./panel/served.ts";
 import { chosen, isStill, keep, STILL_MS } from "./preferences.ts";
-import { Cancelled, type Work } from "./record/picture.ts";
+import type { Work } from "./record/picture.ts";
 import { RecordView } from "./record/record.ts";
 import type { Change } from "./row/machine.ts";
 import { isOn, isWaiting, turn, wakeOnTouch } from "./signals.ts";
@@ -50,7 +50,7 @@ const page = new Parts(document.body, "id");
 
 translate(document.body);
 inLanguage(() => {
-    document.documentElement.lang = language();
+    document.documentElement.lang = language;
 });
 const languages = page.get("language", HTMLSelectElement);
 for (const [code, { name }] of Object.entries(LANGUAGES)) {
@@ -58,14 +58,14 @@ for (const [code, { name }] of Object.entries(LANGUAGES)) {
     option.lang = code;
     languages.append(option);
 }
-languages.value = language();
+languages.value = language;
 languages.addEventListener("change", () => speak(languages.value as Code));
 page.say("unchecked", () => say("unchecked"));
 
 /** The row's seed: another row at each visit, or that of an address with `?seed=7`. */
 const seed = Number(new URLSearchParams(location.search).get("seed"));
 const simulation = new Simulation(hex, Number.isSafeInteger(seed) && seed > 0 ? seed : Date.now(), true);
-const drawing = new Drawing(page.get("drawing", SVGSVGElement), simulation);
+const drawing = new Drawing(page.get("drawing", SVGSVGElement));
 const tryPanel = new Panel(page.html("try-panel"), "try");
 /** The chip's time. Timeouts use it, so that a slow or paused simulation causes no timeout. */
 const chipMs = () => (simulation.uno.cycle / CYCLES_PER_SECOND) * 1000;
@@ -95,7 +95,7 @@ new RecordView(new Parts(page.html("view-record")), tryLog);
 /** The log of "Try it", which weeds on until some plants are in it. */
 async function tryLog({ progress, cancel }: Work): Promise<File> {
     for (;;) {
-        if (cancel.aborted) throw new Cancelled();
+        cancel.throwIfAborted();
         const share = simulation.machine.toolMm / EXAMPLE_MM;
         progress(Math.min(Math.max(share, 0), 1));
         // A machine that stands makes the log no longer.
@@ -191,17 +191,13 @@ for (const changed of ["resize", "scroll"])
         document.documentElement.style.setProperty("--keyboard", `${covered}px`);
     });
 
-/** Light or dark as in the system, or always light, for sunlight. */
+/** Light or dark as in the system, or always light, for sunlight: the style looks at the button. */
 const light = page.button("light", () => {
     const on = light.ariaPressed !== "true";
     keep("light", on ? "on" : "off");
-    lighten(on);
-});
-function lighten(on: boolean): void {
     light.ariaPressed = String(on);
-    document.documentElement.classList.toggle("light", on);
-}
-lighten(chosen("light") === "on");
+});
+light.ariaPressed = String(chosen("light") === "on");
 
 const sound = page.button("sound", () => {
     turn(!isOn());

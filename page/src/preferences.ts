@@ -5,7 +5,6 @@
 const PREFIX = "weeder.";
 const now = new Map<string, string>();
 
-/** A choice; undefined if there is none. */
 export function chosen(name: string): string | undefined {
     const inPage = now.get(name);
     if (inPage !== undefined) return inPage;

@@ -5,22 +5,18 @@
 
 import { chosen, keep } from "./preferences.ts";
 
-export type Signal = "alarm" | "lost" | "held";
-
-/** Tones one after the other, with the same pause after each; and the vibration, on and off in ms. */
-interface Sound {
-    /** The tones' frequencies, and how long each lasts. */
-    readonly hz: readonly number[];
-    readonly ms: readonly number[];
-    readonly pauseMs: number;
-    readonly vibration: readonly number[];
-}
-
-const SOUNDS: Readonly<Record<Signal, Sound>> = {
-    alarm: { hz: Array(4).fill(1760), ms: Array(4).fill(180), pauseMs: 90, vibration: [300, 100, 300, 100, 300] },
+/** Tones one after the other, each with its length and the same pause after it; and the vibration, on and off in ms. */
+const SOUNDS = {
+    alarm: {
+        hz: [1760, 1760, 1760, 1760],
+        ms: [180, 180, 180, 180],
+        pauseMs: 90,
+        vibration: [300, 100, 300, 100, 300],
+    },
     lost: { hz: [660, 440, 330], ms: [350, 350, 500], pauseMs: 30, vibration: [1000] },
     held: { hz: [660, 990], ms: [110, 160], pauseMs: 20, vibration: [80, 60, 80] },
 };
+type Signal = keyof typeof SOUNDS;
 /** Time in which the same signal is given only once: several machines may obey together. */
 const ONCE_MS = 300;
 /** Gain, from 0 to 1. A square wave sounds louder than its value. */
@@ -70,17 +66,14 @@ export function signal(which: Signal): void {
     lastMs[which] = nowMs;
     const { hz, ms, pauseMs, vibration } = SOUNDS[which];
     // An untouched page may not vibrate, and the browser logs an error.
-    if (navigator.userActivation?.hasBeenActive !== false) navigator.vibrate?.([...vibration]);
+    if (navigator.userActivation?.hasBeenActive !== false) navigator.vibrate?.(vibration);
     // Its clock stands: the tones would all come at the next touch.
     if (context?.state !== "running") return;
     let atS = Math.max(context.currentTime, busyUntilS);
     for (const [number, frequency] of hz.entries()) {
         const lengthMs = ms[number] ?? 0;
-        const [tone, volume] = [context.createOscillator(), context.createGain()];
-        tone.type = "square";
-        tone.frequency.value = frequency;
-        volume.gain.value = GAIN;
-        tone.connect(volume).connect(context.destination);
+        const tone = new OscillatorNode(context, { type: "square", frequency });
+        tone.connect(new GainNode(context, { gain: GAIN })).connect(context.destination);
         tone.start(atS);
         tone.stop(atS + lengthMs / 1000);
         atS += (lengthMs + pauseMs) / 1000;

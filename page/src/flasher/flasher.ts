@@ -9,6 +9,8 @@ import { readHex, usedBytes } from "../uno/hex.ts";
 import { english, quantity, say, show, told } from "../words/words.ts";
 import { BOARDS, type Board, Bootloader, FlashError, PAGE_BYTES, type Progress } from "./stk500.ts";
 
+const PHASES = { waiting: "phaseWaiting", writing: "phaseWriting", verifying: "phaseVerifying" } as const;
+
 export class Flasher {
     /** Called before a port is opened for flashing. The owner of the port must close it. */
     onBegin: (port: SerialPort) => Promise<void> = async () => {};
@@ -31,24 +33,24 @@ export class Flasher {
         const choice = parts.get("board", HTMLSelectElement);
         for (const { id, name } of BOARDS) {
             const option = new Option("", id);
-            show(option, () => (typeof name === "string" ? name : say(name.text)));
+            show(option, () => name ?? say("oldBoard"));
             choice.append(option);
         }
         const last = BOARDS.find(({ id }) => id === chosen("board"));
         if (last) choice.value = last.id;
         const warn = () => {
-            const isOld = BOARDS.some(({ id, isOld }) => isOld && id === choice.value);
-            parts.say("board-said", () => (isOld ? say("oldBootloader") : ""));
+            const board = BOARDS[choice.selectedIndex];
+            parts.say("board-said", () => (board?.isOld ? say("oldBootloader") : ""));
         };
         warn();
         choice.addEventListener("change", () => {
             keep("board", choice.value);
             warn();
         });
-        parts.button("hex", () => download("weeder.hex", hex, "text/plain"));
+        parts.button("hex", () => download(new File([hex], "weeder.hex", { type: "text/plain" })));
         parts.button("to-work", () => this.#flashed && this.onWork(this.#flashed));
         const why = whyNoSerial();
-        const start = parts.button("flash", () => void this.#start(choice.value));
+        const start = parts.button("flash", () => void this.#start(BOARDS[choice.selectedIndex]));
         start.disabled = why !== undefined;
         parts.say("no-serial", () => told(why ?? ""));
         globalThis.addEventListener("beforeunload", (event) => {
@@ -59,8 +61,7 @@ export class Flasher {
         });
     }
 
-    async #start(id: string): Promise<void> {
-        const board = BOARDS.find((board) => board.id === id);
+    async #start(board: Board | undefined): Promise<void> {
         if (!board || this.#isBusy) return;
         this.#isBusy = true;
         const flash = this.parts.get("flash", HTMLButtonElement);
@@ -122,13 +123,7 @@ export class Flasher {
         this.parts.html("progress").hidden = false;
         if (phase === "waiting") bar.removeAttribute("value");
         else bar.value = share;
-        const percent = { share: quantity(share * 100, "percent") };
-        this.parts.write(
-            "phase",
-            phase === "waiting"
-                ? say("phaseWaiting")
-                : say(phase === "writing" ? "phaseWriting" : "phaseVerifying", percent),
-        );
+        this.parts.write("phase", say(PHASES[phase], { share: quantity(share * 100, "percent") }));
     }
 
     #say(kind: "done" | "failed" | "", text: () => string): void {

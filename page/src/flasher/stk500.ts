@@ -3,27 +3,20 @@
 // A command ends with CRC_EOP. Its answer begins with INSYNC and ends with OK. The bootloader listens for a second or
 // two after a reset. Addresses are in words. Optiboot and its predecessor erase each page before they write it.
 
-import { after, wait } from "../clock.ts";
+import { wait } from "../clock.ts";
 import type { PortError, SerialLine } from "../link/serial.ts";
-import { english, type Plain } from "../words/words.ts";
+import { english } from "../words/words.ts";
 
-/** A board that can be flashed. The boards differ in their bootloader alone. */
-export interface Board {
-    readonly id: string;
-    /** Its common name, or the key of a text. */
-    readonly name: string | { readonly text: Plain };
-    /** The bootloader's rate in bits a second, and the flash that remains for the firmware, of 32 KiB. */
-    readonly baud: number;
-    readonly roomBytes: number;
-    /** Whether its bootloader is the one before optiboot. */
-    readonly isOld: boolean;
-}
-
-export const BOARDS: readonly Board[] = [
+/**
+ * The boards that can be flashed. They differ in their bootloader alone: its rate in bits a second, the flash that
+ * remains for the firmware, of 32 KiB, and whether it is the one before optiboot, whose board's name is a text.
+ */
+export const BOARDS = [
     { id: "uno", name: "Arduino Uno", baud: 115_200, roomBytes: 32_256, isOld: false },
     { id: "nano", name: "Arduino Nano", baud: 115_200, roomBytes: 30_720, isOld: false },
-    { id: "old", name: { text: "oldBoard" }, baud: 57_600, roomBytes: 30_720, isOld: true },
+    { id: "old", baud: 57_600, roomBytes: 30_720, isOld: true },
 ];
+export type Board = (typeof BOARDS)[number];
 
 /** An error of flashing, and what to do. */
 export class FlashError extends Error {}
@@ -207,13 +200,10 @@ export class Bootloader {
             if (this.#gone) throw this.#gone;
             const left = by - performance.now();
             if (left <= 0) return undefined;
-            await new Promise<void>((done) => {
-                const stop = after(left, done);
-                this.#arrived = () => {
-                    stop();
-                    done();
-                };
+            const arrived = new Promise<void>((done) => {
+                this.#arrived = done;
             });
+            await Promise.race([arrived, wait(left)]);
         }
     }
 }

@@ -15,23 +15,17 @@ export function linesOf<Name extends ConsoleLine["is"]>(name: Name, lines: reado
     return lines.map(read).filter((said): said is Line<Name> => said.is === name);
 }
 
-/** The order in which values can be sent, or why they cannot be at all. */
-export interface Steps {
-    /** The contradiction, and what would be right. */
-    readonly contradiction?: string;
-    readonly steps: readonly (readonly [name: string, value: number])[];
-}
-
 /**
- * The values to send to change the machine's settings, without a contradiction on the way. Invalid values come last:
- * the machine reports their errors.
+ * The values to send to change the machine's settings, in an order without a contradiction on the way. Invalid values
+ * come last: the machine reports their errors. If the values contradict each other: what would be right.
  */
-export function steps(from: readonly Setting[], to: ReadonlyMap<string, number>): Steps {
-    const isBad = ([, value]: readonly [string, number]) => !(Number.isInteger(value) && value >= 0 && value <= 65_535);
-    const values = from.map(({ name, value }) => [name, value] as const);
-    const good = [...to].filter((entry) => !isBad(entry));
-    const answer = ask<Steps>({ steps: { from: Object.fromEntries(values), to: Object.fromEntries(good) } });
-    return { ...answer, steps: [...answer.steps, ...[...to].filter(isBad)] };
+export function steps(from: readonly Setting[], to: ReadonlyMap<string, number>) {
+    const isBad = ([, value]: [string, number]) => !(Number.isInteger(value) && value >= 0 && value <= 65_535);
+    const values = Object.fromEntries(from.map(({ name, value }) => [name, value]));
+    const good = Object.fromEntries([...to].filter((entry) => !isBad(entry)));
+    type Answer = { contradiction?: string; steps: [name: string, value: number][] };
+    const { contradiction, steps } = ask<Answer>({ steps: { from: values, to: good } });
+    return { contradiction, steps: [...steps, ...[...to].filter(isBad)] };
 }
 
 /** Distance of an encoder count, by the values of the settings: of the calibrated wheel, or of its diameter. */

@@ -13,12 +13,10 @@ export class Log {
     /** Whether it has work, or something that the operator did, since `text` was called. */
     isUnsaved = false;
 
-    /** Lines in it, without the heading. */
     get length(): number {
         return this.#lines.length;
     }
 
-    /** Records an event at a time. */
     add(happening: Happening, nowMs: number): void {
         this.#from ??= nowMs;
         const { is } = happening;

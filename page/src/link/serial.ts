@@ -8,7 +8,6 @@ import { english } from "../words/words.ts";
 import { isServed } from "./served.ts";
 import { Session } from "./session.ts";
 
-/** An error of a port, and what to do. */
 export class PortError extends Error {}
 
 /** How long DTR and RTS are released, so that the board's capacitor sees an edge, and the wait after it. */
@@ -64,7 +63,6 @@ export class SerialLine {
     #reader: ReadableStreamDefaultReader<Uint8Array> | undefined;
     #isClosing = false;
     #closed: Promise<void> | undefined;
-    /** Gives up this page's lock. */
     #unlock = () => {};
 
     /** Opens a port. Throws a PortError. */
@@ -153,7 +151,6 @@ export class SerialLine {
     }
 }
 
-/** A session over a serial line. */
 export function sessionOver(line: SerialLine, now: number): Session {
     const encoder = new TextEncoder();
     // A lost line has reported its error.

@@ -13,7 +13,6 @@ import { type Happening, type Link, type News, NoMachine, NotSent, Refused, tell
 
 /** Silence after which the computer counts as lost: it sends a message twice a second. */
 const SILENCE_MS = 3000;
-/** Time between two tries to reach it. */
 const RETRY_MS = 2000;
 /** Time limit of a HOLD, and of a question about the computer. The page then tries again. */
 const SHORT_MS = 1500;
@@ -30,7 +29,6 @@ export interface Allowed {
     readonly mayChange: boolean;
 }
 
-/** The result of a HOLD to all machines. */
 export interface HeldAll {
     /** Each machine, and why it has not obeyed. */
     readonly machines: readonly { readonly name: string; readonly error: string | null }[];
@@ -43,25 +41,19 @@ export function isServed(): boolean {
     return new URLSearchParams(location.search).has("served");
 }
 
-/** News of a machine. */
 type About = News | { is: "lost"; why: string; isWanted?: boolean };
 
 type Message = (About & { machine: number }) | { is: "beat" | "dropped" | "held" };
 
 /** Sends a request. It fails with `NoMachine` at its time limit, or when `gone` aborts. Returns the status and the body. */
 async function send(path: string, limitMs: number, request: RequestInit = {}, gone?: AbortSignal) {
-    const limit = new AbortController();
-    const give = () => limit.abort();
-    const timer = setTimeout(give, limitMs);
-    gone?.addEventListener("abort", give);
+    const limit = AbortSignal.timeout(limitMs);
+    const signal = gone ? AbortSignal.any([limit, gone]) : limit;
     try {
-        const answer = await fetch(path, { ...request, signal: limit.signal });
+        const answer = await fetch(path, { ...request, signal });
         return { status: answer.status, isOk: answer.ok, text: await answer.text() };
     } catch {
         throw gone?.aborted ? gone.reason : new NoMachine(SILENT);
-    } finally {
-        clearTimeout(timer);
-        gone?.removeEventListener("abort", give);
     }
 }
 
@@ -75,7 +67,6 @@ export class Served {
     /** The number of the last message. */
     #seen = "";
 
-    /** Asks the computer for its machines. */
     static async open(): Promise<Served> {
         const { isOk, text } = await send("/machines", LONG_MS);
         if (!isOk) throw new Error(text);
@@ -119,7 +110,6 @@ export class Served {
         return JSON.parse(text) as HeldAll;
     }
 
-    /** Checks whether the computer has fallen silent. */
     watch(): void {
         if (this.#events && performance.now() - this.#heardMs > SILENCE_MS) this.#lose(SILENT);
     }
@@ -133,12 +123,8 @@ export class Served {
         if (!this.#events) return;
         this.#events.close();
         this.#events = undefined;
-        this.#tellLost(why, isWanted);
-        setTimeout(() => void this.#again(), RETRY_MS);
-    }
-
-    #tellLost(why: string, isWanted = false): void {
         for (const machine of this.machines) machine.tell({ is: "lost", why, isWanted });
+        setTimeout(() => void this.#again(), RETRY_MS);
     }
 
     async #again(): Promise<void> {
@@ -147,8 +133,10 @@ export class Served {
         const isOther = answer?.status === 401 || (answer?.isOk && answer.text !== this.text);
         // Some browsers would not ask before they drop a log.
         if (isOther && !this.mayReload()) {
-            for (const machine of this.machines) machine.isOther = true;
-            this.#tellLost(english("servedOther"));
+            for (const machine of this.machines) {
+                machine.isOther = true;
+                machine.tell({ is: "lost", why: english("servedOther") });
+            }
         } else if (isOther) location.reload();
         else if (answer?.isOk && !this.#isBehind) this.listen();
         else setTimeout(() => void this.#again(), RETRY_MS);
@@ -196,14 +184,10 @@ export class ServedMachine implements Link {
         await this.#type("hold", SHORT_MS);
     }
 
-    /** Takes the computer's news of it. */
     tell(message: About): void {
-        if (message.is === "lost") {
-            this.#lose(message.why, message.isWanted);
-            return;
-        }
         if (message.is === "there") this.#there = new AbortController();
-        tell(message, (happening) => this.onHappening(happening));
+        if (message.is === "lost") this.#lose(message.why, message.isWanted);
+        else tell(message, (happening) => this.onHappening(happening));
     }
 
     #lose(why: string, isWanted = false): void {

@@ -36,7 +36,6 @@ export type Happening =
     | { is: "status"; status: Line<"status">; line: string }
     /** The present warning has changed, or has ended. */
     | { is: "warning"; warning: string | undefined }
-    /** The machine sent an event line. */
     | { is: "event"; event: EventLine; line: string }
     | { is: "command"; line: string }
     | { is: "answer"; line: string }
@@ -91,7 +90,6 @@ export type News =
     /** `weeder serve` tells only of restarts at work. */
     | { is: "restarted"; said: string; wasAtWork?: boolean };
 
-/** Tells news as happenings. */
 export function tell(news: News, onHappening: (happening: Happening) => void): void {
     switch (news.is) {
         case "there": {
@@ -122,12 +120,6 @@ export function tell(news: News, onHappening: (happening: Happening) => void): v
     }
 }
 
-/** Why no weeder answers, and what the reason is about. */
-interface Failure {
-    readonly is: "noText" | "nothingAnswers" | "otherDevice" | "resetWhileAsked";
-    readonly about: string;
-}
-
 /** What a turn has led to. A failure ends the session. */
 interface Turn {
     readonly news: readonly (
@@ -138,7 +130,8 @@ interface Turn {
         | { is: "unanswered"; number: number; why: "late" | "held" | "notTyped" | "unknown"; because: string | null }
     )[];
     readonly send: string;
-    readonly failure: Failure | null;
+    /** Why no weeder answers, and what the reason is about. */
+    readonly failure: { is: "noText" | "nothingAnswers" | "otherDevice" | "resetWhileAsked"; about: string } | null;
 }
 
 export class Session implements Link {
@@ -240,7 +233,6 @@ export class Session implements Link {
         return ask<Answer>({ session: { session: this.#session, what } });
     }
 
-    /** Resolves with the answer to a command. */
     #end(number: number): Promise<string[]> {
         return new Promise((done, failed) => {
             this.#askers.set(number, [...(this.#askers.get(number) ?? []), { done, failed }]);
@@ -286,12 +278,11 @@ export class Session implements Link {
 }
 
 /** Why no weeder answers: on a page the remedies are other ones than those of the command. */
-function whyNone({ is, about }: Failure): string {
+function whyNone({ is, about }: NonNullable<Turn["failure"]>): string {
     if (is === "otherDevice") return english(is, { text: about });
     return is === "resetWhileAsked" ? english(is, { command: about }) : english(is);
 }
 
-/** Why a command was not answered. */
 function whyNot(why: "late" | "held" | "notTyped" | "unknown", because: string): Error {
     if (why === "late") return new NotSent(english("waitedTooLong"));
     if (why === "held") return new NotSent(english("holdFirst"));

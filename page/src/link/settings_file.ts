@@ -29,7 +29,7 @@ export function save(settings: readonly Setting[], help: ReadonlyMap<string, str
         const value = setting.isSwitched ? setting.value === 1 : setting.value;
         return `\n# ${help.get(setting.name) ?? ""}\n# ${range(setting)}\n${setting.name} = ${value}\n`;
     });
-    download("machine.toml", head + entries.join(""), "application/toml");
+    download(new File([head, ...entries], "machine.toml", { type: "application/toml" }));
 }
 
 /**

@@ -54,7 +54,6 @@ export class Calibration {
         this.parts.html("wheel-force").hidden = true;
     }
 
-    /** Shows the values that change while the machine rolls. */
     show(): void {
         const { status, tickMm } = this.machine;
         const isOn = this.#from !== undefined && status !== undefined;

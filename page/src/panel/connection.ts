@@ -9,7 +9,6 @@ import { sentence } from "./machine.ts";
 import { type Panel, TURN_MS } from "./panel.ts";
 import { Update } from "./update.ts";
 
-/** The firmware's rate. */
 const BAUD = 115_200;
 
 /** How often a port is opened that is back, and the time between: another program may have it for some seconds. */
@@ -129,7 +128,6 @@ export class Connection {
         else this.#say(() => told(english("noPort")));
     }
 
-    /** Does something with a port, and shows the port's error. */
     async #attempt(work: () => Promise<void>): Promise<void> {
         await work().catch((error) => {
             if (!(error instanceof PortError)) throw error;

@@ -2,7 +2,6 @@
 
 import { make, type Parts } from "../dom.ts";
 
-/** Greatest number of lines. */
 const LINES = 500;
 
 /** Greatest distance from the end, in pixels, at which the console still scrolls with new lines. */

@@ -7,7 +7,6 @@ import { read, tickMm } from "../link/grammar.ts";
 import type { Happening } from "../link/session.ts";
 import { ended, english, type Plain, quantity, say, table, told } from "../words/words.ts";
 
-/** Objects that are remembered. */
 const OBJECTS = 50;
 
 /**
@@ -42,7 +41,7 @@ export class Machine {
     version: string | undefined;
     mayStart = true;
     /** Why it is lost, in English. */
-    #lost: string = english("noneConnected");
+    lost: string = english("noneConnected");
     /** Whether it may be weeding without a connection. */
     #mayWeedOn = false;
     /** The last known ones. */
@@ -52,7 +51,6 @@ export class Machine {
     restarted: string | undefined;
     /** The present time, as `statusMs`. */
     nowMs = 0;
-    /** The latched alarm's name. */
     alarm: string | undefined;
     warning: string | undefined;
     status: Line<"status"> | undefined;
@@ -64,7 +62,6 @@ export class Machine {
     objects: Line<"detection">[] = [];
     zones: Line<"detection">[] = [];
 
-    /** Takes an event at a time. */
     take(happening: Happening, nowMs: number): void {
         switch (happening.is) {
             case "connected":
@@ -114,7 +111,6 @@ export class Machine {
             case "event":
                 this.#take(happening.event);
                 break;
-            default:
         }
     }
 
@@ -135,7 +131,6 @@ export class Machine {
             case "alarm":
                 [this.mode, this.toolOut, this.alarm, this.zones] = ["alarm", true, event.alarm, []];
                 break;
-            default:
         }
     }
 
@@ -161,11 +156,6 @@ export class Machine {
         const { status } = this;
         if (!status) return 0;
         return status.position + this.ticks((status.speedMmS * Math.min(nowMs - this.statusMs, 500)) / 1000);
-    }
-
-    /** Why it is lost, in English. What it may do without a connection stays. */
-    set lost(why: string) {
-        this.#lost = why;
     }
 
     /** Whether it is connected and works, as far as it has told. */
@@ -209,7 +199,7 @@ export class Machine {
 
     get #reason(): string {
         if (this.version === undefined)
-            return `${sentence(told(this.#lost))}${this.#mayWeedOn ? ` ${say("weedsOn")}` : ""}`;
+            return `${sentence(told(this.lost))}${this.#mayWeedOn ? ` ${say("weedsOn")}` : ""}`;
         if (this.state === "unknown") return say("notTold");
         if (this.mode === "alarm") return say("outUntilCleared");
         if (this.mode === "hold" && !this.toolOut) return say("movedByHand");

@@ -35,7 +35,6 @@ const LASTING_MS = 1000;
 const TABS = ["settings", "calibrate", "examples", "console"] as const;
 
 export class Panel {
-    /** Called for each event, after the panel. */
     onHappening: (happening: Happening) => void = () => {};
     /** Whether the next machine may be another than the last one. Its saved settings then show that. */
     mayBeOther = false;
@@ -58,7 +57,6 @@ export class Panel {
     #holdPending: { againMs: number | undefined; why?: string } | undefined;
     #link: Link | undefined;
     #now = 0;
-    /** When the strip was last drawn. */
     #drawnMs = Number.NEGATIVE_INFINITY;
 
     /**
@@ -83,7 +81,7 @@ export class Panel {
         const why = (error: unknown) => sentence(told(error));
         for (const command of ["start", "clear"])
             parts.button(command, () => void parts.attempt("drive-said", ask(command), undefined, why));
-        const save = () => download("weeder-log.csv", this.#log.text(), "text/csv");
+        const save = () => download(this.log);
         parts.button("log-save", save);
         parts.button("log-clear", () => {
             if (this.#log.isUnsaved) save();
@@ -155,7 +153,6 @@ export class Panel {
         }
     }
 
-    /** Sends HOLD no more, and no longer says so. */
     #dropHold(): void {
         this.#holdPending = undefined;
         this.#parts.write("drive-said", "");
@@ -205,7 +202,6 @@ export class Panel {
         return true;
     }
 
-    /** Goes on, at the machine's time. */
     turn(nowMs: number): void {
         this.#now = this.machine.nowMs = nowMs;
         const pending = this.#holdPending;
@@ -213,7 +209,6 @@ export class Panel {
         this.#link?.turn?.(nowMs);
     }
 
-    /** Shows changes and moving parts. */
     show(): void {
         const { machine } = this;
         const { status } = machine;
@@ -295,7 +290,6 @@ export class Panel {
         this.#isHolding = false;
     }
 
-    /** Enables buttons while a machine is connected. */
     #showConnected(): void {
         const isThere = this.machine.version !== undefined;
         for (const button of this.#parts.root.querySelectorAll<HTMLButtonElement>("button.needs-machine"))
@@ -313,7 +307,7 @@ export class Panel {
         } catch (error) {
             const { message } = error as Error;
             const text = told(message);
-            if (text !== message) answered.lang = language();
+            if (text !== message) answered.lang = language;
             this.#parts.write("answered", text);
             // The console has no line of what was not sent.
             if (error instanceof NotSent) this.#console.add(`${line}: ${message}`, "error");
@@ -367,7 +361,6 @@ function isAlarm(event: EventLine): boolean {
     return event.is === "alarm" || (event.is === "newer" && event.isAlarm);
 }
 
-/** The line of the console about an event, and its kind. */
 function inConsole(happening: Happening): Parameters<Console["add"]> | undefined {
     switch (happening.is) {
         case "started":

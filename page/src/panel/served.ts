@@ -7,7 +7,6 @@ import { ended, inLanguage, quantity, say, show, told } from "../words/words.ts"
 import { fault } from "./machine.ts";
 import { Panel, TURN_MS } from "./panel.ts";
 
-/** Fills an element with the machines' panels, and returns these. */
 export async function showServed(into: HTMLElement): Promise<Panel[]> {
     const served = await Served.open();
     const all = make("section", "overview stack");
@@ -27,7 +26,7 @@ export async function showServed(into: HTMLElement): Promise<Panel[]> {
     };
     const showAll = names.length > 1 ? overview(all, names, holdAll) : undefined;
     if (showAll) into.append(all);
-    const shown = served.machines.map((machine, number) => {
+    for (const [number, machine] of served.machines.entries()) {
         const { name } = machine;
         const element = make("div", showAll ? "panel stack" : "panel stack alone");
         const section = make("section", "served stack", make("h2", "", name), element);
@@ -42,9 +41,8 @@ export async function showServed(into: HTMLElement): Promise<Panel[]> {
         machine.onAbsent = (why) => {
             panel.machine.lost = why;
         };
-        return panel;
-    });
-    panels.push(...shown);
+        panels.push(panel);
+    }
     served.mayReload = () => !panels.some(({ isNeeded }) => isNeeded);
     setInterval(() => {
         served.watch();

@@ -9,7 +9,6 @@ import { Rust } from "../rust.ts";
 import { ended, language, type Plain, quantity, say, show, table, told } from "../words/words.ts";
 import type { Machine } from "./machine.ts";
 
-/** The results of the session for the steps. */
 interface Advice {
     readonly steps: readonly {
         readonly title: string;
@@ -22,7 +21,6 @@ interface Advice {
     }[];
     /** The next step; null before the first measurement. */
     readonly next: string | null;
-    /** The missing measurements for the margin. */
     readonly missing: readonly string[];
     readonly marginMm: number | null;
     readonly warning: string | null;
@@ -76,7 +74,7 @@ export class SetUp {
         const { steps, next, missing, marginMm, warning } = this.#rust.ask<Advice>({ setUp: { lines, settings } });
         this.#marginMm = marginMm;
         // Built once for each language, because the operator may be typing.
-        if (this.#language !== language()) this.#build(steps);
+        if (this.#language !== language) this.#build(steps);
         for (const [name, input] of this.#inputs)
             if (input.dataset.typed === undefined) input.value = String(this.machine.setting(name));
         let done = 0;
@@ -98,7 +96,7 @@ export class SetUp {
     }
 
     #build(steps: Advice["steps"]): void {
-        this.#language = language();
+        this.#language = language;
         this.#inputs.clear();
         this.#marks = steps.map((manual, at) => (manual.isShown ? make("p", "aside") : this.#box(at)));
         this.parts.html("set-up-steps").replaceChildren(
@@ -165,24 +163,21 @@ export class SetUp {
      * of a step can be worse than none.
      */
     async #save(names: readonly string[]): Promise<void> {
-        const typed = names.flatMap((name) => {
-            const input = this.#inputs.get(name);
-            return input?.dataset.typed === undefined ? [] : [{ name, input }];
-        });
+        const typed = [...this.#inputs].filter(([name, { dataset }]) => names.includes(name) && "typed" in dataset);
         // The machine says what would be right.
-        const wrong = typed.find(({ name, input }) => {
+        const wrong = typed.find(([name, input]) => {
             const setting = this.machine.settings.find((setting) => setting.name === name);
             const value = /^\d+$/.test(input.value) ? Number(input.value) : Number.NaN;
             return setting && !(setting.least <= value && value <= setting.greatest);
         });
-        if (wrong) await this.ask(`set ${wrong.name} ${wrong.input.value}`);
-        const wanted = new Map(typed.map(({ name, input }) => [name, Number(input.value)]));
+        if (wrong) await this.ask(`set ${wrong[0]} ${wrong[1].value}`);
+        const wanted = new Map(typed.map(([name, input]) => [name, Number(input.value)]));
         const { contradiction, steps } = order(this.machine.settings, wanted);
         // Settings that already contradict each other are corrected one at a time.
         const isContradicted = order(this.machine.settings, new Map()).contradiction !== undefined;
         if (contradiction && !isContradicted) throw new Error(contradiction);
         for (const [name, value] of contradiction ? wanted : steps) await this.ask(`set ${name} ${value}`);
-        for (const { input } of typed) delete input.dataset.typed;
+        for (const [, input] of typed) delete input.dataset.typed;
         await this.ask("save");
     }
 }

@@ -31,7 +31,6 @@ export class SettingsForm {
         parts.files("settings-open-file", "settings-file", ([file]) => file && void this.#open(file));
     }
 
-    /** Drops the operator's changes. */
     forget(): void {
         this.parts.write("settings-said", "");
         this.#undo();

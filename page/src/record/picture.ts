@@ -39,7 +39,6 @@ export interface Problem {
     readonly problem: string;
 }
 
-/** The Rust's answer. */
 interface Head {
     readonly lengthMm: number;
     readonly timeMs: number;
@@ -67,7 +66,6 @@ export class Table<Columns extends readonly string[]> {
         return this.values.length / this.columns.length;
     }
 
-    /** The rows on this ground. */
     near(fromMm: number, toMm: number): Row<Columns>[] {
         const { values, columns, first, end } = this;
         const rows: Row<Columns>[] = [];
@@ -83,7 +81,6 @@ export class Table<Columns extends readonly string[]> {
         return rows;
     }
 
-    /** The row that begins nearest to a position. */
     nearest(placeMm: number): Row<Columns> {
         const awayMm = (row: number) => Math.abs((this.values[row + this.first] ?? 0) - placeMm);
         let best = 0;
@@ -105,8 +102,6 @@ export interface Picture extends Head {
     readonly fastestMmS: number;
 }
 
-export class Cancelled extends Error {}
-
 /** How work goes on: `progress` gets its share that is done, from 0 to 1, and `cancel` ends it. */
 export interface Work {
     readonly progress: (share: number) => void;
@@ -120,7 +115,7 @@ export function read<Said>(logs: readonly File[], wants: Asked["wants"], { progr
     address ??= URL.createObjectURL(new Blob([code], { type: "text/javascript" }));
     const worker = new Worker(address);
     const answer = new Promise<Said>((resolve, reject) => {
-        cancel.addEventListener("abort", () => reject(new Cancelled()), { once: true });
+        cancel.addEventListener("abort", () => reject(cancel.reason), { once: true });
         worker.addEventListener("error", ({ message }) => reject(new Error(message)));
         worker.addEventListener("message", ({ data }: MessageEvent<Told>) => {
             if ("share" in data) progress(data.share);
@@ -146,12 +141,4 @@ export async function picture(log: File, work: Work): Promise<Picture | Problem>
         speeds: new Table(speeds, SPEED, 0, 1),
         worked: new Table(worked, WORKED, 0, 2),
     };
-}
-
-/** The map of some logs. */
-export interface GroundMap {
-    /** Null if nothing has a position. */
-    readonly svg: string | null;
-    /** How many objects have one. */
-    readonly placed: number;
 }

@@ -7,8 +7,6 @@ import { draw, make, type Parts } from "../dom.ts";
 import { fault, sentence } from "../panel/machine.ts";
 import { onLanguage, quantity, reason, say } from "../words/words.ts";
 import {
-    Cancelled,
-    type GroundMap,
     type Picture,
     type Problem,
     picture,
@@ -40,7 +38,6 @@ const CLASSES = ["canopy", "weed", "canopy unknown"];
 /** The legend of the map: see host/gps/src/picture.rs. */
 const MAP_LEGEND = ["mapWeeded", "mapLeft", "plant", "mapKept", "legendWeed", "mapLabel", "mapAlarm"] as const;
 
-/** A log that is shown. */
 interface Row {
     readonly file: File;
     readonly picture: Picture;
@@ -157,8 +154,8 @@ export class RecordView {
             return true;
         } catch (error) {
             if (this.#work !== work) return false;
-            const why = () => say("notRead", { file: at, why: reason(error) });
-            this.parts.say(said, () => (error instanceof Cancelled ? say("cancelled") : why()));
+            const { aborted } = work.signal;
+            this.parts.say(said, () => say(aborted ? "cancelled" : "notRead", { file: at, why: reason(error) }));
             return false;
         } finally {
             if (this.#work === work) busy.hidden = true;
@@ -242,7 +239,7 @@ export class RecordView {
             north: say("north"),
         };
         await this.#eachOf(files.slice(0, 1), "log-mapped", async (_, work) => {
-            const { svg, placed } = await read<GroundMap>(files, { map: words }, work);
+            const { svg, placed } = await read<{ svg: string | null; placed: number }>(files, { map: words }, work);
             this.parts.say("log-mapped", () => (svg ? say("mapped", { count: placed }) : say("noMap")));
             this.#showMap(svg);
         });

@@ -9,14 +9,8 @@ export interface Asked {
     readonly module: WebAssembly.Module;
     /** One log; several for a map. */
     readonly logs: readonly File[];
-    readonly wants: "picture" | "replay" | { readonly map: MapWords };
-}
-
-/** The texts of a map: see host/gps/src/picture.rs. */
-export interface MapWords {
-    readonly legend: readonly string[];
-    readonly withoutPlace: string;
-    readonly north: string;
+    /** The map's texts: see host/gps/src/picture.rs. */
+    readonly wants: "picture" | "replay" | { map: { legend: string[]; withoutPlace: string; north: string } };
 }
 
 /** Its messages: the progress from 0 to 1, the answer, or the error. */

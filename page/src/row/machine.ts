@@ -20,7 +20,7 @@ export interface Thing {
 }
 
 /** The stretch of ground below a thing. */
-export function span({ placeMm, widthMm }: Thing): { startMm: number; endMm: number } {
+export function span({ placeMm, widthMm }: Thing): { readonly startMm: number; readonly endMm: number } {
     return { startMm: placeMm - widthMm / 2, endMm: placeMm + widthMm / 2 };
 }
 

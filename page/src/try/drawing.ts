@@ -3,8 +3,8 @@
 // One unit is a millimetre on the ground. The machine rolls to the right; up is left of the row. Things on the ground
 // are drawn once and moved with it, and removed when they have left the picture.
 
-import { draw, set } from "../dom.ts";
-import { span, type Thing, type Verdict } from "../row/machine.ts";
+import { draw } from "../dom.ts";
+import { type Machine, span, type Thing, type Verdict } from "../row/machine.ts";
 import type { Simulation } from "./simulation.ts";
 
 /** The picture's width across the row, from its line: to the side of the tool's swing, and to the other side. */
@@ -75,66 +75,44 @@ class Shapes {
 }
 
 export class Drawing {
-    readonly #svg: SVGSVGElement;
-    readonly #ground = draw("g", {});
     readonly #specks = new Shapes();
-    readonly #track = draw("path", { fill: "none", stroke: "var(--worked)" });
-    readonly #zones = draw("g", {});
+    /** The tool's track, and the keep-out zones. */
+    readonly #marks = draw("g", {});
     readonly #things = new Shapes();
-    readonly #soil = draw("rect", { fill: "var(--soil)" });
-    readonly #beam = draw("line", { stroke: "var(--beam)", y1: -ACROSS_MM.out + 30, y2: ACROSS_MM.other - 10 });
-    readonly #arm = draw("line", { stroke: "var(--ink)", "stroke-width": 11, "stroke-linecap": "round" });
-    readonly #blade = draw("rect", { fill: "var(--ink)", rx: 6 });
-    readonly #angle = draw("text", { fill: "var(--ink)", "font-size": 30, "text-anchor": "middle" });
+    readonly #ground = draw("g", {}, this.#specks.group, this.#marks, this.#things.group);
+    readonly #machine = draw("g", {});
 
-    constructor(svg: SVGSVGElement, { machine }: Simulation) {
-        this.#svg = svg;
-        const { beamToToolMm, toolWidthMm } = machine.dimensions;
-        set(this.#track, { "stroke-width": toolWidthMm });
-        this.#ground.append(this.#specks.group, this.#track, this.#zones, this.#things.group);
-        set(this.#beam, { x1: beamToToolMm, x2: beamToToolMm });
-        const wheel = { fill: "var(--pale)", width: 190, height: 34, rx: 10, x: AXLE_MM - 150 };
-        const frameMm = { left: -ACROSS_MM.out + 30, right: ACROSS_MM.other - 10 };
-        svg.append(
-            this.#soil,
-            this.#ground,
-            draw("path", {
-                stroke: "var(--pale)",
-                "stroke-width": 9,
-                d: `M${AXLE_MM} ${frameMm.left}V${frameMm.right}M${AXLE_MM} 0H0`,
-            }),
-            draw("rect", { ...wheel, y: frameMm.left - 17 }),
-            draw("rect", { ...wheel, y: frameMm.right - 17 }),
-            this.#beam,
-            this.#arm,
-            this.#blade,
-            draw("rect", { fill: "var(--ink)", width: SERVO_MM, height: 30, y: -15, rx: 5 }),
-            this.#angle,
-        );
+    constructor(private readonly svg: SVGSVGElement) {
+        svg.append(this.#ground, this.#machine);
     }
 
     draw(simulation: Simulation): void {
-        const { machine, zones } = simulation;
-        const { toolMm, degrees } = machine;
+        const { toolMm, things } = simulation.machine;
         const heightMm = ACROSS_MM.out + ACROSS_MM.other;
-        const { clientWidth, clientHeight } = this.#svg;
+        const { clientWidth, clientHeight } = this.svg;
         const lengthMm = (heightMm * Math.max(clientWidth, 1)) / Math.max(clientHeight, 1);
         const behindMm = Math.min(lengthMm * BEHIND.share, BEHIND.mostMm);
-        const picture = { x: -behindMm, y: -ACROSS_MM.out, width: lengthMm, height: heightMm };
-        this.#svg.setAttribute("viewBox", Object.values(picture).join(" "));
-        set(this.#soil, picture);
-
+        this.svg.setAttribute("viewBox", `${-behindMm} ${-ACROSS_MM.out} ${lengthMm} ${heightMm}`);
         this.#ground.setAttribute("transform", `translate(${-toolMm} 0)`);
         const [fromMm, toMm] = [toolMm - behindMm, toolMm - behindMm + lengthMm];
-        const { things } = machine;
         const isSeen = (thing: Thing) => span(thing).endMm > fromMm && span(thing).startMm < toMm;
         const seen = things.flatMap((thing, number) => (isSeen(thing) ? [number] : []));
         this.#things.show(seen, (number) => thingShape(things[number] as Thing));
         this.#drawVerdicts(simulation);
         this.#drawSpecks(fromMm, toMm);
-        const way = simulation.track.map(({ alongMm, acrossMm }) => `${alongMm.toFixed(1)} ${(-acrossMm).toFixed(1)}`);
-        this.#track.setAttribute("d", way.length > 1 ? `M${way.join("L")}` : "");
-        this.#zones.replaceChildren(
+        this.#drawMarks(simulation, fromMm, toMm);
+        this.#drawMachine(simulation.machine);
+    }
+
+    #drawMarks({ track, zones, machine }: Simulation, fromMm: number, toMm: number): void {
+        const way = track.map(({ alongMm, acrossMm }) => `${alongMm.toFixed(1)} ${(-acrossMm).toFixed(1)}`);
+        this.#marks.replaceChildren(
+            draw("path", {
+                fill: "none",
+                stroke: "var(--worked)",
+                "stroke-width": machine.dimensions.toolWidthMm,
+                d: way.length > 1 ? `M${way.join("L")}` : "",
+            }),
             ...zones
                 .filter(({ startMm, endMm }) => endMm > fromMm && startMm < toMm)
                 .map(({ startMm, endMm }) =>
@@ -149,17 +127,41 @@ export class Drawing {
                     }),
                 ),
         );
+    }
 
-        const { toolWidthMm } = machine.dimensions;
-        const tool = { x: simulation.tool.alongMm - toolMm, y: -simulation.tool.acrossMm };
-        const broken = machine.isBroken;
-        set(this.#beam, { "stroke-width": broken ? 9 : 4, "stroke-dasharray": broken ? "none" : "12 7" });
-        // A pendulum from above: it hangs from the servo over the row's line, and lifts the blade beside it.
-        set(this.#arm, { x1: 0, y1: 0, x2: tool.x, y2: tool.y });
-        set(this.#blade, { x: tool.x - 16, y: tool.y - toolWidthMm / 2, width: 32, height: toolWidthMm });
-        set(this.#angle, { x: tool.x - 70, y: tool.y - 25 });
+    #drawMachine({ degrees, acrossMm, isBroken, dimensions }: Machine): void {
+        const { beamToToolMm, toolWidthMm } = dimensions;
+        const [left, right] = [-ACROSS_MM.out + 30, ACROSS_MM.other - 10];
+        const wheel = { fill: "var(--pale)", width: 190, height: 34, rx: 10, x: AXLE_MM - 150 };
+        const beam = isBroken ? { "stroke-width": 9 } : { "stroke-width": 4, "stroke-dasharray": "12 7" };
         // Added to 0, a negative 0 loses its sign.
-        this.#angle.textContent = `${Math.round(degrees) + 0}\u00b0`;
+        const angle = `${Math.round(degrees) + 0}\u00b0`;
+        this.#machine.replaceChildren(
+            draw("path", {
+                stroke: "var(--pale)",
+                "stroke-width": 9,
+                d: `M${AXLE_MM} ${left}V${right}M${AXLE_MM} 0H0`,
+            }),
+            draw("rect", { ...wheel, y: left - 17 }),
+            draw("rect", { ...wheel, y: right - 17 }),
+            draw("line", { ...beam, stroke: "var(--beam)", x1: beamToToolMm, x2: beamToToolMm, y1: left, y2: right }),
+            // A pendulum from above: it hangs from the servo over the row's line, and lifts the blade beside it.
+            draw("line", { stroke: "var(--ink)", "stroke-width": 11, "stroke-linecap": "round", y2: -acrossMm }),
+            draw("rect", {
+                fill: "var(--ink)",
+                rx: 6,
+                x: -16,
+                y: -acrossMm - toolWidthMm / 2,
+                width: 32,
+                height: toolWidthMm,
+            }),
+            draw("rect", { fill: "var(--ink)", width: SERVO_MM, height: 30, y: -15, rx: 5 }),
+            draw(
+                "text",
+                { fill: "var(--ink)", "font-size": 30, "text-anchor": "middle", x: -70, y: -acrossMm - 25 },
+                angle,
+            ),
+        );
     }
 
     #drawVerdicts({ machine, outcome }: Simulation): void {

@@ -4,14 +4,11 @@
 // host/field/src/budget.rs without guarded ground, and add up to the whole stretch. The firmware's output decides: its
 // state, its reason, and its keep-out zones.
 
-import type { Machine, Thing } from "../row/machine.ts";
+import { type Machine, span, type Thing } from "../row/machine.ts";
 import { quantity, say } from "../words/words.ts";
 
 /** A keep-out zone along the row. */
-export interface Zone {
-    readonly startMm: number;
-    readonly endMm: number;
-}
+export type Zone = ReturnType<typeof span>;
 
 /** The parts of the ground: the text of each, and of a tall weed that was left on it. */
 const PARTS = {
@@ -24,7 +21,6 @@ const PARTS = {
 } as const;
 type Part = keyof typeof PARTS;
 
-/** Why a plant was not kept. */
 const NOT_KEPT = { unseen: "notKeptUnseen", off: "notKeptOff", late: "notKeptLate" } as const;
 export type NotKept = keyof typeof NOT_KEPT;
 
@@ -35,8 +31,7 @@ const CLOSED = ["unseen_ground", "too_fast", "encoder_doubtful"];
 
 /** Why a plant was not kept that needs this width and the margins on both sides. */
 export function whyNotKept(plant: Thing, widthMm: number, zones: readonly Zone[], marginMm: number): NotKept {
-    const { placeMm } = plant;
-    const [fromMm, toMm] = [placeMm - widthMm / 2 - marginMm, placeMm + widthMm / 2 + marginMm];
+    const { startMm: fromMm, endMm: toMm } = span({ ...plant, widthMm: widthMm + 2 * marginMm });
     const over = zones.filter(({ startMm, endMm }) => startMm < toMm && endMm > fromMm);
     if (over.length === 0) return "unseen";
     const isOff = !over.some(({ startMm, endMm }) => startMm <= fromMm + OFF_MM && endMm >= toMm - OFF_MM);

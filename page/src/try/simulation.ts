@@ -17,22 +17,16 @@ const KEPT_MM = 3000;
 /** Cycles between two checks of the PC's clock: a millisecond. */
 const SLICE_CYCLES = CYCLES_PER_SECOND / 1000;
 
-/** A point of the tool's path over the ground: along the row, and across it from the row's line. */
-export interface TrackPoint {
-    readonly alongMm: number;
-    readonly acrossMm: number;
-}
-
 export class Simulation {
     readonly uno: Uno;
     readonly machine: Machine;
     readonly outcome = new Outcome();
     readonly losses: Losses;
-    /** Called with the firmware's output. */
     onText: (text: string) => void = () => {};
     /** Keep-out zones at the tool or ahead of it, from the firmware's output. */
     zones: Zone[] = [];
-    track: TrackPoint[] = [];
+    /** The tool's path over the ground: along the row, and across it from the row's line. */
+    track: { readonly alongMm: number; readonly acrossMm: number }[] = [];
     /** The machine's count when the firmware began to count. */
     #zero = 0;
 
@@ -61,7 +55,6 @@ export class Simulation {
         return (uno.cycle - begin) / CYCLES_PER_SECOND;
     }
 
-    /** Throws the work switch. */
     work(on: boolean): void {
         this.uno.set(PIN.workSwitch, !on);
     }
@@ -75,11 +68,6 @@ export class Simulation {
 
     get isLampLit(): boolean {
         return this.uno.isHigh(PIN.lamp);
-    }
-
-    /** The tool's position. The pendulum moves it only across the row. */
-    get tool(): TrackPoint {
-        return { alongMm: this.machine.toolMm, acrossMm: this.machine.acrossMm };
     }
 
     take(happening: Happening): void {
@@ -118,10 +106,10 @@ export class Simulation {
 
     /** Adds the tool's position to its track. On a straight line only its end moves. */
     #mark(): void {
-        const { track, tool } = this;
-        const [before, last] = [track.at(-2), track.at(-1)];
-        if (before?.acrossMm === tool.acrossMm && last?.acrossMm === tool.acrossMm) track.pop();
-        track.push(tool);
+        const { track, machine } = this;
+        const { toolMm: alongMm, acrossMm } = machine;
+        if (track.length > 1 && track.slice(-2).every((point) => point.acrossMm === acrossMm)) track.pop();
+        track.push({ alongMm, acrossMm });
     }
 
     #forget(): void {

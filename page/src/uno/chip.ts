@@ -27,7 +27,6 @@ import {
 } from "avr8js";
 import { addTimer } from "./timer.ts";
 
-/** Cycles of the Uno's clock in a second. */
 export const CYCLES_PER_SECOND = 16_000_000;
 
 /** Bytes of the chip's memories. */
@@ -48,7 +47,6 @@ const RXC0 = 0x80;
 /** SMCR: sleep is enabled. */
 const SE = 0x01;
 
-/** Start address of SRAM in the data space. */
 const SRAM_START = 0x100;
 
 /** Half of the write time of a byte in the EEPROM: 3.4 ms in all (data sheet, table 8-1). */
@@ -74,14 +72,14 @@ export class Chip {
     readonly usart: AVRUSART;
     /** Whether the watchdog has run out: the chip stands still until it is replaced. */
     watchdogRanOut = false;
-    readonly #cpu: CPU;
+    readonly cpu: CPU;
     #until = 0;
     #isAsleep = false;
 
     /** Starts with these memories, after this cause, at this cycle. */
     constructor(program: Uint16Array, sram: Uint8Array, eeprom: EEPROMBackend, cause: ResetCause, cycle: number) {
         const cpu = new CPU(program, SRAM_BYTES);
-        this.#cpu = cpu;
+        this.cpu = cpu;
         cpu.cycles = cycle;
         cpu.data.set(sram, SRAM_START);
         cpu.data[MCUSR] = RESET_CAUSES[cause];
@@ -105,23 +103,18 @@ export class Chip {
         };
     }
 
-    /** Sets the external level of a pin. */
     set(pin: number, high: boolean): void {
         const found = this.pins[pin];
         found?.port.setPin(found.bit, high);
     }
 
-    get cycle(): number {
-        return this.#cpu.cycles;
-    }
-
     get sram(): Uint8Array {
-        return this.#cpu.data.slice(SRAM_START);
+        return this.cpu.data.slice(SRAM_START);
     }
 
     /** Runs to the end of the instruction at `cycle`, or until the watchdog runs out. */
     run(cycle: number): void {
-        const cpu = this.#cpu;
+        const cpu = this.cpu;
         const program = cpu.progMem;
         this.#until = cycle;
         while (cpu.cycles < this.#until) {
@@ -149,14 +142,9 @@ export class Chip {
 
     /** Lets the time pass to the next event of a peripheral, unless an interrupt is waiting. */
     #skipToEvent(): void {
-        const cpu = this.#cpu;
+        const cpu = this.cpu;
         if (cpu.nextInterrupt >= 0 && cpu.interruptsEnabled) return;
         cpu.cycles = Math.max(cpu.cycles, Math.min(this.#until, nextEvent(cpu)));
-    }
-
-    /** Calls `happen` after this number of cycles, unless a reset comes before. */
-    after(cycles: number, happen: () => void): void {
-        this.#cpu.addClockEvent(happen, cycles);
     }
 
     /**
@@ -165,6 +153,6 @@ export class Chip {
      * once.
      */
     get takesByte(): boolean {
-        return this.#cpu.interruptsEnabled && !((this.#cpu.data[UCSR0A] ?? 0) & RXC0);
+        return this.cpu.interruptsEnabled && !((this.cpu.data[UCSR0A] ?? 0) & RXC0);
     }
 }

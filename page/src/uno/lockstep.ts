@@ -18,14 +18,9 @@ interface Turn {
     readonly reset: boolean;
 }
 
-/** The outputs of a turn. */
-interface Done {
-    readonly edges: [cycle: number, pin: number, high: boolean][];
-    readonly said: number[];
-}
-
 let uno: Uno | undefined;
-let done: Done = { edges: [], said: [] };
+/** The outputs of a turn. */
+const done: { edges: [cycle: number, pin: number, high: boolean][]; said: number[] } = { edges: [], said: [] };
 
 function powerUp(hex: string): Uno {
     const uno = new Uno(hex);
@@ -49,5 +44,5 @@ createInterface({ input: process.stdin }).on("line", (line) => {
     if ("hex" in said) uno = powerUp(said.hex);
     else if (uno) take(uno, said);
     process.stdout.write(`${JSON.stringify(done)}\n`);
-    done = { edges: [], said: [] };
+    [done.edges, done.said] = [[], []];
 });

@@ -61,12 +61,12 @@ export class Uno {
 
     /** Cycles since the first power-up. */
     get cycle(): number {
-        return this.#chip.cycle;
+        return this.#chip.cpu.cycles;
     }
 
     /** Lets the clock run to the first end of an instruction at or after a cycle. */
     runUntil(cycle: number): void {
-        while (this.#chip.cycle < cycle) {
+        while (this.cycle < cycle) {
             this.#chip.run(cycle);
             if (this.#chip.watchdogRanOut) this.#restart("watchdog", this.#chip.sram);
         }
@@ -95,7 +95,7 @@ export class Uno {
     }
 
     #restart(cause: ResetCause, sram: Uint8Array): void {
-        const { cycle } = this.#chip;
+        const { cycle } = this;
         this.resets.push({ cycle, cause });
         // All pins are released.
         for (const pin of [...this.#driven.keys()]) this.#drives(pin, false, cycle);
@@ -106,7 +106,7 @@ export class Uno {
     #start(cause: ResetCause, cycle: number, sram: Uint8Array): Chip {
         const chip = new Chip(this.#program, sram, this.#backend, cause, cycle);
         for (const [pin, { port, bit }] of chip.pins.entries())
-            port.addListener(() => this.#drives(pin, port.pinState(bit) === PinState.High, chip.cycle));
+            port.addListener(() => this.#drives(pin, port.pinState(bit) === PinState.High, chip.cpu.cycles));
         chip.usart.onByteTransmit = (byte) => this.onByte(byte);
         for (const [pin, high] of this.#inputs) chip.set(pin, high);
         return chip;
@@ -120,16 +120,17 @@ export class Uno {
 
     /** Lets the next byte arrive at its time. */
     #sendNext(chip: Chip): void {
-        this.#lineFree = Math.max(this.#lineFree, chip.cycle) + SENT_BYTE_CYCLES;
+        this.#lineFree = Math.max(this.#lineFree, chip.cpu.cycles) + SENT_BYTE_CYCLES;
         const arrive = (): void => {
             if (!chip.takesByte) {
-                chip.after(NEXT_INSTRUCTION, arrive);
+                chip.cpu.addClockEvent(arrive, NEXT_INSTRUCTION);
                 return;
             }
             // A receiver that is off ignores it.
             chip.usart.writeByte(this.#toSend.shift() ?? 0, true);
             if (this.#toSend.length > 0) this.#sendNext(chip);
         };
-        chip.after(this.#lineFree - chip.cycle, arrive);
+        // A reset before makes another chip.
+        chip.cpu.addClockEvent(arrive, this.#lineFree - chip.cpu.cycles);
     }
 }

@@ -14,11 +14,9 @@ export type Word = keyof typeof en.words;
 export type Plain = { [Key in Word]: [Holes<(typeof en.words)[Key]>] extends [never] ? Key : never }[Word];
 type HeardWord = keyof typeof en.heard;
 
-/** A language's table. */
 export interface Language {
     /** Its own name for itself. */
     readonly name: string;
-    /** The texts of the page. */
     readonly words: Readonly<Record<Word, string>>;
     /** Texts that stay English until they are shown. */
     readonly heard: Readonly<Record<HeardWord, string>>;
@@ -34,7 +32,6 @@ export interface Language {
 type Holes<Text extends string> = Text extends `${string}{${infer Hole}}${infer Rest}` ? Hole | Holes<Rest> : never;
 
 const { hi, es, fr } = translations;
-/** The languages. */
 export const LANGUAGES = { en, hi, es, fr } as const satisfies Readonly<Record<string, Language>>;
 export type Code = keyof typeof LANGUAGES;
 
@@ -54,18 +51,15 @@ function preferred(): Code {
     return languages.map(base).find(isCode) ?? "en";
 }
 
-let code: Code = preferred();
-/** Its table. */
-export let table: Language = LANGUAGES[code];
+export let language: Code = preferred();
+export let table: Language = LANGUAGES[language];
 const changes: (() => void)[] = [];
 const formats = new Map<string, Intl.NumberFormat>();
-
-export const language = (): Code => code;
 
 /** Chooses a language, and writes all texts again that are not updated continuously. */
 export function speak(chosen: Code): void {
     keep("language", chosen);
-    [code, table] = [chosen, LANGUAGES[chosen]];
+    [language, table] = [chosen, LANGUAGES[chosen]];
     formats.clear();
     for (const change of changes) change();
 }
@@ -87,34 +81,29 @@ function format(options: Intl.NumberFormatOptions): Intl.NumberFormat {
     let found = formats.get(key);
     if (!found) {
         const { languages = [] } = globalThis.navigator ?? {};
-        const locale = languages.find((locale) => base(locale) === code) ?? code;
+        const locale = languages.find((locale) => base(locale) === language) ?? language;
         found = new Intl.NumberFormat(locale, options);
         formats.set(key, found);
     }
     return found;
 }
 
-/** A number with this number of decimal places. */
-export function number(value: number, digits = 0): string {
-    return format(digitsOf(digits)).format(value);
+/** A number with this number of decimal places, and in the given style. */
+export function number(value: number, digits = 0, style: Intl.NumberFormatOptions = {}): string {
+    const places = { minimumFractionDigits: digits, maximumFractionDigits: digits };
+    // Rounding a small negative number gives no negative 0.
+    return format({ ...style, ...places, signDisplay: "negative" }).format(value);
 }
-
-/** These decimal places. Rounding a small negative number gives no negative 0. */
-const digitsOf = (digits: number): Intl.NumberFormatOptions => ({
-    minimumFractionDigits: digits,
-    maximumFractionDigits: digits,
-    signDisplay: "negative",
-});
 
 /** A number with its unit, by the unit's name in `Intl.NumberFormat`. */
 export function quantity(value: number, unit: string, digits = 0): string {
-    return format({ style: "unit", unit, ...digitsOf(digits) }).format(value);
+    return number(value, digits, { style: "unit", unit });
 }
 
 /** A text with its holes filled, in the form for `count`. */
 function fill(text: string, holes: Readonly<Record<string, string | number>> = {}): string {
     const forms = text.split("|");
-    const isOne = forms.length > 1 && new Intl.PluralRules(code).select(Number(holes.count)) === "one";
+    const isOne = forms.length > 1 && new Intl.PluralRules(language).select(Number(holes.count)) === "one";
     const form = (isOne ? forms[0] : forms.at(-1)) ?? text;
     return form.replaceAll(/\{(\w+)\}/g, (_, hole: string) => {
         const value = holes[hole] ?? "";
@@ -122,7 +111,6 @@ function fill(text: string, holes: Readonly<Record<string, string | number>> = {
     });
 }
 
-/** A text of the page. */
 export function say<Key extends Word>(word: Key, ...[holes]: Filling<(typeof en.words)[Key]>): string {
     return fill(table.words[word], holes);
 }
@@ -148,13 +136,12 @@ export function ended(text: string): string {
     return /[.!?।]$/.test(text) ? text : text + stop;
 }
 
-/** The text of an error. */
 export const reason = (error: unknown): string => (error instanceof Error ? error.message : String(error));
 
 /** Translates such a text or an error's, with its values. Unknown text stays: the machine itself speaks English. */
 export function told(english: unknown): string {
     const text = reason(english);
-    if (code === "en") return text;
+    if (language === "en") return text;
     // A number within such a text.
     const [, decimals] = /^\d+\.(\d+)$/.exec(text) ?? [];
     if (decimals) return number(Number(text), decimals.length);
