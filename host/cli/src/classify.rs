@@ -55,10 +55,11 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
 
 /// The class of each detection, with its votes.
 fn as_json(model: &Model, objects: &[Recorded]) -> Result<Value> {
-    let row = |object: &Recorded| {
+    let row = |(number, object): (usize, &Recorded)| {
         let answer = model.answer(&object.features)?;
         let votes = |kind| answer.votes[usize::from(label_of(kind))];
         Ok(json!({
+            "detection": number,
             "answer": format!("{:?}", class_of(&answer)).to_lowercase(),
             "votes_plant": votes(Kind::Plant),
             "votes_weed": votes(Kind::Weed),
@@ -66,5 +67,5 @@ fn as_json(model: &Model, objects: &[Recorded]) -> Result<Value> {
             "label": object.kind.map(|kind| kind.to_string()),
         }))
     };
-    objects.iter().map(row).collect()
+    (1..).zip(objects).map(row).collect()
 }

@@ -236,7 +236,11 @@ impl Guide {
         let settings = settings::read(&mut self.link)?;
         writeln!(Results, "\nSummary\n  Set and saved:")?;
         for setting in Setting::all().filter(|&setting| settings.get(setting) != setting.default()) {
-            writeln!(Results, "    {} {} {}", name(setting), settings.get(setting), unit(setting))?;
+            let value = match (setting.is_switched(), settings.get(setting)) {
+                (false, value) => value.to_string(),
+                (true, value) => if value == 0 { "off" } else { "on" }.to_owned(),
+            };
+            writeln!(Results, "    {} {value} {}", name(setting), unit(setting))?;
         }
         let mut is_open = false;
         for ManualStep { number, title, tasks, .. } in steps {

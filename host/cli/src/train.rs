@@ -4,7 +4,10 @@
 use anyhow::{Error, Result, bail, ensure};
 use clap::builder::TypedValueParser;
 use clap::{ArgGroup, Args};
-use control::{ground::examples, settings::Setting};
+use control::{
+    ground::{class::Class, examples},
+    settings::Setting,
+};
 use field::row::Kind;
 use frame::{
     Messages, OutFile, OutName, Replace, Results,
@@ -257,16 +260,15 @@ impl Display for Fresh {
                 classified
             }
             Self::None(why) => {
-                return write!(f, "Held out: nothing, so nothing tells how the table does in the field: {why}");
+                return write!(
+                    f,
+                    "Held out: nothing, so nothing tells how the table does in the field. Without a fifth of the detections, {why}"
+                );
             }
         };
-        let plants = Share::of(classified.plants_taken_for_weeds() as u64, classified.count(Kind::Plant) as u64);
+        let plants = plants_cut(classified);
         writeln!(f, "{classified}")?;
-        write!(
-            f,
-            "With 95 % confidence, {:.2} % of the plants at most are classified as weeds",
-            plants.greatest_percent
-        )
+        write!(f, "In the field, {plants} % of the plants may be classified as weeds ({})", plants.kind())
     }
 }
 
@@ -314,7 +316,22 @@ fn in_json(training: &Training, objects: &[Labelled], fresh: &Fresh) -> Value {
 }
 
 fn counts_in_json(classified: &Confusion) -> Value {
-    json!({ "objects": classified.total(), "plants_taken_for_weeds": classified.plants_taken_for_weeds() })
+    let of = |kind| {
+        let count = |class| classified.of(kind, class);
+        json!({ "plant": count(Class::Plant), "unknown": count(Class::Unknown), "weed": count(Class::Weed) })
+    };
+    json!({
+        "objects": classified.total(),
+        "plants_taken_for_weeds": classified.plants_taken_for_weeds(),
+        "plants_taken_for_weeds_share": plants_cut(classified),
+        "plants_as": of(Kind::Plant),
+        "weeds_as": of(Kind::Weed),
+    })
+}
+
+/// The share of the plants that would be cut.
+fn plants_cut(classified: &Confusion) -> Share {
+    Share::of(classified.plants_taken_for_weeds() as u64, classified.count(Kind::Plant) as u64)
 }
 
 /// Whether a table is written as Rust, by the ending of its name, and not as CSV.

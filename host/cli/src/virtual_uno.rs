@@ -25,7 +25,7 @@ The firmware runs as on a real Uno, with a simulated machine that rolls along th
 Opening the port resets it, as on a real Uno. In another terminal:
 
   weeder virtual-uno --link /tmp/uno --eeprom uno.eeprom
-  picocom -b 115200 /tmp/uno        (type `help`, `clear`, `start`, `status`)
+  picocom --echo -b 115200 /tmp/uno    (type `help`, `clear`, `start`, `status`)
 
 An Uno with an empty flash and a bootloader, for avrdude:
 

@@ -147,6 +147,21 @@ impl Conditions {
         (!warnings.is_empty()).then(|| warnings.join(" "))
     }
 
+    /// The names of parameters that differ from their defaults, and that a pass of one row at a steady speed does not use.
+    pub fn unused_by_a_row(&self) -> Vec<&'static str> {
+        const USED: [&str; 5] = [
+            "crop.protected_mm",
+            "ground.slip_percent",
+            "sensors.beam_mm",
+            "sensors.beam_response_ms",
+            "sensors.lost_pulses_percent",
+        ];
+        let default = Self::default();
+        let changed = self.values().zip(default.values()).filter(|((_, value), (_, default))| value != default);
+        let names = changed.map(|((parameter, _), _)| parameter.name);
+        names.filter(|name| !name.starts_with("machine.") && !USED.contains(name)).collect()
+    }
+
     /// Whether the machine strays farther than its sweeps allow, in sentences.
     fn cutting_sweeps(&self) -> Option<String> {
         let (between, swept) = (self.between_zones_mm(), self.machine.swept_mm());

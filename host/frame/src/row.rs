@@ -1,10 +1,11 @@
 //! `weeder sim`: the real firmware on a virtual Uno, on a simulated row or on a recording of a real encoder.
 
 use crate::{
-    CourseArguments, Finding, OutFile, OutFolder, OutName, Replace, Results, source, with_bar, write_if_asked,
+    CourseArguments, Finding, Messages, OutFile, OutFolder, OutName, Replace, Results, source, with_bar, write_if_asked,
 };
 use anyhow::Result;
 use clap::Args;
+use field::conditions::Conditions;
 use field::motion::mm_s;
 use field::pass::Pass;
 use field::row::Row;
@@ -96,6 +97,16 @@ impl Arguments {
 fn weed(arguments: &Arguments, row: Row, folder: Option<&OutFolder>, vcd: Option<&OutFile>) -> Result<Finding> {
     let course = &arguments.course;
     let conditions = course.conditions_of(arguments.field())?;
+    let unused = conditions.unused_by_a_row();
+    // Of a preset, the help says what counts.
+    if Conditions::preset(arguments.field()).is_none() && !unused.is_empty() {
+        writeln!(
+            Messages,
+            "Warning: one row, driven evenly and seen without faults, does not use {} of {}: `weeder trial --field` does",
+            unused.join(", "),
+            in_a_line(arguments.field())
+        );
+    }
     let mut pass = conditions.pass_at_speed(row, mm_s(course.speed), course.seed);
     pass.motion = pass.motion.with_slip(|| conditions.ground.slip_percent / 100.0);
     let elf = arguments.elf.clone().map_or_else(firmware::build, Ok)?;

@@ -216,7 +216,7 @@ pub fn claim(name: &str) -> Result<Claim, LinkError> {
     let path = lock_of(name);
     // Another user's file can be locked, but not written. Windows locks no file that is only appended to.
     let lock = open_lock(&path, File::options().read(true).create(true).append(true))
-        .or_else(|_| open_lock(&path, File::options().read(true)));
+        .or_else(|error| open_lock(&path, File::options().read(true)).map_err(|_| error));
     let not_locked = |source| LinkError::NotClaimed { path: path.clone(), source };
     let lock = lock.map_err(not_locked)?;
     // Other users lock it too, so the mode does not follow the umask. Setting it fails if the file is another user's.

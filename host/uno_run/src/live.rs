@@ -25,6 +25,8 @@ use field::servo::{Servo, Stroke};
 use field::wiring;
 use files::bounded_file;
 use std::collections::VecDeque;
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{Seek, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc;
@@ -405,32 +407,39 @@ fn terminal(link: Option<&Path>) -> Result<Pty> {
 /// The file with the EEPROM's content.
 struct EepromFile {
     path: PathBuf,
+    /// Locked: two virtual Unos would overwrite what the other has saved.
+    file: File,
     content: Vec<u8>,
 }
 
 impl EepromFile {
-    /// Reads it; a file that does not exist yet is an erased EEPROM.
+    /// Opens it; a file that does not exist yet is an erased EEPROM.
     fn open(path: PathBuf) -> Result<EepromFile> {
-        match bounded_file::bytes(&path) {
-            Ok(content) if content.len() == EEPROM_BYTES => Ok(EepromFile { path, content }),
-            Ok(content) => {
+        let content = match bounded_file::bytes(&path) {
+            Ok(content) if content.len() != EEPROM_BYTES => {
                 let (path, bytes) = (path.display(), content.len());
                 bail!("{path} has {bytes} bytes: a file that keeps the EEPROM has {EEPROM_BYTES}")
             }
-            Err(error) if error.is_absence() => {
-                let mut file = EepromFile { path, content: Vec::new() };
-                // A file that cannot be written is better known now.
-                file.keep(vec![0xFF; EEPROM_BYTES])?;
-                Ok(file)
-            }
-            Err(error) => Err(error).with_context(|| unusable(&path)),
+            Err(error) if error.is_absence() => None,
+            read => Some(read.with_context(|| unusable(&path))?),
+        };
+        let opened = OpenOptions::new().write(true).create(true).truncate(false).open(&path);
+        let file = opened.with_context(|| unusable(&path))?;
+        if matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
+            bail!("another virtual Uno keeps its EEPROM in {}: name another file by --eeprom", path.display());
         }
+        let mut opened = EepromFile { path, file, content: content.unwrap_or_default() };
+        if opened.content.is_empty() {
+            opened.keep(vec![0xFF; EEPROM_BYTES])?;
+        }
+        Ok(opened)
     }
 
     /// Writes it where the content has changed.
     fn keep(&mut self, content: Vec<u8>) -> Result<()> {
         if content != self.content {
-            std::fs::write(&self.path, &content).with_context(|| unusable(&self.path))?;
+            let written = self.file.rewind().and_then(|()| self.file.write_all(&content));
+            written.with_context(|| unusable(&self.path))?;
             self.content = content;
         }
         Ok(())

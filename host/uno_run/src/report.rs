@@ -126,11 +126,14 @@ pub fn totals(pass: &Pass, conditions: &Conditions, outcome: &Outcome) -> String
     let percent = 100.0 * share_from_row_to_row(conditions, judgement.weeded_share);
     line("", format!("({percent:.1} % of the {} mm from row to row, with the sweeps)", conditions.plot.row_spacing_mm));
     line("Swings", swing_words(judgement, &pass.machine));
+    if status.alarm.is_some() {
+        line("", "the alarm's swing is one of them".to_owned());
+    }
     if outcome.stray_pulses > 0 {
         let pulses = counted(outcome.stray_pulses, "pulse");
         line("", format!("{pulses} of a width that no servo knows: ignored"));
     }
-    line("Encoder", count_words(outcome));
+    line("Encoder", count_words(outcome, pass.machine.dirt.share));
     if status.state != "work" {
         let alarm = status.alarm.as_ref().map(|alarm| format!(" {alarm}")).unwrap_or_default();
         line("Firmware", format!("ended in `{}`{alarm}, not at work", status.state));
@@ -169,10 +172,12 @@ fn swing_words(judgement: &Judgement, machine: &Machine) -> String {
     )
 }
 
-fn count_words(outcome: &Outcome) -> String {
+/// The encoder's count against the wheel's. The field hides this share of its pulses.
+fn count_words(outcome: &Outcome, hidden: f64) -> String {
     let off = outcome.status.position_ticks - outcome.true_ticks;
     let place = match off {
         0 => "exactly the wheel's".to_owned(),
+        off if hidden > 0.0 => format!("{off:+} from the wheel's, of whose pulses dirt hides {} %", 100.0 * hidden),
         off => format!("{off:+} from the wheel's"),
     };
     let Status { position_ticks, lost_ticks, .. } = outcome.status;

@@ -12,6 +12,7 @@ use ratatui::crossterm::event::{
 };
 use ratatui::crossterm::execute;
 use ratatui::crossterm::tty::IsTty;
+use std::env;
 use std::io::{self, IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -34,6 +35,9 @@ pub fn run(rows: &Rows, names: Vec<String>, mut logs: Option<Logs>) -> Result<()
         has_keys,
         "this terminal passes no keys, not even Esc: use PowerShell, `winpty weeder monitor`, or --plain"
     );
+    // Without a name, too, nobody knows what the terminal can do.
+    let is_dumb = cfg!(unix) && env::var("TERM").map_or(true, |name| matches!(name.as_str(), "" | "dumb"));
+    ensure!(!is_dumb, "this terminal shows no full screen (TERM is `dumb` or not set): --plain does without");
     let mut terminal = ratatui::try_init().context("the terminal cannot be drawn on: --plain does without")?;
     // On Windows, a click would begin a selection: the output stops, and the first Esc only ends the selection.
     if cfg!(windows) {

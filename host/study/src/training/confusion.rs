@@ -28,7 +28,7 @@ impl FromIterator<(Kind, Class)> for Confusion {
 
 impl Confusion {
     /// The detections of a kind that were classified as a class.
-    fn of(&self, kind: Kind, class: Class) -> usize {
+    pub fn of(&self, kind: Kind, class: Class) -> usize {
         self.0[kind as usize][class as usize]
     }
 
