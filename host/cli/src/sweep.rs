@@ -196,13 +196,21 @@ fn about(sweep: &Sweep) -> String {
     format!("{text}, {}.", sweep.controller.title())
 }
 
-/// All results of all points, by the names of the file's columns. A missing result is null.
+/// All results of all points, by the names of the file's columns. A missing result is null. Where an axis has speed or spacing, its
+/// value replaces that of the sweep.
 fn in_json(sweep: &Sweep, points: &[Point]) -> Value {
     let point = |point: &Point| {
         let values = place(point).chain(point.results).map(Value::from);
         Map::from_iter(columns(sweep).map(str::to_owned).zip(values))
     };
-    json!({ "points": points.iter().map(point).collect::<Vec<_>>() })
+    json!({
+        "field": sweep.field,
+        "seed": sweep.seed,
+        "controller": sweep.controller.title(),
+        "speed_km_h": sweep.speed_km_h,
+        "spacing_cm": sweep.spacing_cm,
+        "points": points.iter().map(point).collect::<Vec<_>>(),
+    })
 }
 
 /// The axes by their names, and then the results.

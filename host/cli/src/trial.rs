@@ -284,7 +284,13 @@ fn show(
         writeln!(
             Results,
             "{:#}",
-            json!({ "summary": summary, "plots": outcomes.iter().map(in_json).collect::<Vec<_>>() })
+            json!({
+                "field": study.field,
+                "seed": study.experiment.seed,
+                "seeds": study.experiment.seeds,
+                "summary": summary,
+                "plots": outcomes.iter().map(in_json).collect::<Vec<_>>(),
+            })
         )
     } else if brief {
         writeln!(Results, "{}\n{}", by_speed(&totals, Brief), about(study))

@@ -378,7 +378,7 @@ impl PlotOutcome {
     }
 
     /// What only a simulated field can tell of a plot, by its column's name. Shares are in percent.
-    pub fn figures(&self) -> [(&'static str, Value); 13] {
+    pub fn figures(&self) -> [(&'static str, Value); 15] {
         let Self { zones, effect, .. } = self;
         [
             ("zones", zones.all.into()),
@@ -386,6 +386,8 @@ impl PlotOutcome {
             ("margins_cut", zones.margins_cut.into()),
             ("in_row_weeds_before", effect.in_row.before.into()),
             ("in_row_weeds_after", effect.in_row.after.into()),
+            ("plot_weeds_before", effect.in_plot.before.into()),
+            ("plot_weeds_after", effect.in_plot.after.into()),
             ("in_row_weeded_percent", (100.0 * self.weeded_share).into()),
             ("in_row_bound_percent", (100.0 * self.weedable_share).into()),
             ("undamaged_bound_percent", (100.0 * self.undamaged_share).into()),

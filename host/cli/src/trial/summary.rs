@@ -21,20 +21,21 @@ pub(super) fn summary(experiment: &Experiment, totals: &[Total]) -> Vec<String> 
     let alarms: u32 = of(totals, ControllerKind::Firmware).map(|total| total.plots.alarms).sum();
     if alarms > 0 {
         sentences.push(format!(
-            "In {alarms} of {} rows an alarm took the firmware's tool out for the rest of the row. Exclude those rows.",
+            "In {alarms} of {} rows an alarm took the firmware's tool out for the rest of the row. `alarms` counts them for each plot: exclude those plots.",
             experiment.rows()
         ));
     }
-    let short_of_bound =
-        of(totals, ControllerKind::Firmware).map(|total| total.plots.weedable_share - total.plots.weeded_share);
+    let short_of_bound = of(totals, ControllerKind::Firmware)
+        .map(|total| (total.plots.weedable_share - total.plots.weeded_share, total.speed_km_h()));
+    let (most, km_h) = short_of_bound.max_by(|(one, _), (other, _)| one.total_cmp(other)).unwrap_or_default();
     let zone = match experiment.conditions.timing().stem_zone_mm {
         0 => "canopy".to_owned(),
         zone_mm => format!("zone of {zone_mm} mm round the stem"),
     };
     sentences.push(format!(
         "With each plant's {zone} and its margin kept, this servo could weed at most {:.1} points more of the row's ground than the \
-         firmware did.",
-        100.0 * short_of_bound.fold(0.0, f64::max)
+         firmware did, at {km_h} km/h.",
+        100.0 * most.max(0.0)
     ));
     let mut weeds = Effect::default();
     of(totals, ControllerKind::Firmware).for_each(|total| weeds += total.plots.effect);
