@@ -309,10 +309,15 @@ impl Line<'_> {
         let point = if commas_separate { text.into() } else { with_point(text) };
         let whole =
             || point.split_once('.').filter(|(_, zeros)| zeros.bytes().all(|digit| digit == b'0'))?.0.parse().ok();
+        // R writes 100000 as 1e+05.
+        let with_exponent = || {
+            let value = point.parse::<f64>().ok().filter(|_| point.contains(['e', 'E']))?;
+            format!("{value}").parse().ok()
+        };
         let unclear =
             mark(text).filter(|(mark, may_be_thousands)| *may_be_thousands && self.table.decimal() != Some(*mark));
         let value = match unclear {
-            None => point.parse().ok().or_else(whole),
+            None => point.parse().ok().or_else(whole).or_else(with_exponent),
             Some(_) if commas_separate => point.parse().ok(),
             Some(_) => None,
         };

@@ -33,6 +33,14 @@ fn lines_are_counted_alike_however_they_end() {
 }
 
 #[test]
+fn whole_numbers_may_have_the_exponent_that_r_writes() {
+    assert_eq!(read("place_mm\n1e+02\n1.2e3\n-2E1\n"), Ok(vec![(2, 100), (3, 1200), (4, -20)]));
+    for fraction in ["1.5e0", "1e-05", "1e5", "e5"] {
+        assert!(read(format!("place_mm\n{fraction}\n")).is_err(), "{fraction}");
+    }
+}
+
+#[test]
 fn a_wrong_table_is_refused_with_the_line_and_what_would_be_right() {
     let missing = "the column `place_mm` is missing: the header has to name place_mm";
     for (text, line, problem) in [
