@@ -76,7 +76,6 @@ Example: weeder examples push chilli.csv --replace")]
     },
 }
 
-/// Pulls, pushes or compares.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     match &arguments.action {
         Action::Pull { file, replace, json, port } => {

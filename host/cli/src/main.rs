@@ -131,7 +131,6 @@ enum Command {
     Completions(Box<completions::Arguments>),
 }
 
-/// Runs a command and returns its finding.
 fn run(command: Command) -> Result<Finding> {
     match command {
         Command::Sim(arguments) => row::run(&arguments),
@@ -289,7 +288,6 @@ mod tests {
         ("trial:out", "trial --shard 1/2 --out DIR/new.part", &["new.part"]),
     ];
 
-    /// The report of a trial.
     const TRIAL: [&str; 3] = ["reports/report.html", "reports/trial.csv", "reports/controllers.csv"];
 
     /// Whether it takes free text or a path, without its own parser or list of values.

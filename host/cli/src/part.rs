@@ -84,7 +84,6 @@ impl Part {
     }
 }
 
-/// This program.
 pub fn program() -> Result<Program> {
     let file = env::current_exe().context("the running program cannot be found")?;
     Ok(Program { version: env!("WEEDER_VERSION").to_owned(), build: check_sum(&file)? })

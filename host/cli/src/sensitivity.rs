@@ -139,7 +139,6 @@ fn rows(changed: &[Experiment]) -> String {
     format!("{count} rows of {row_m} m {lines}")
 }
 
-/// Runs it and prints the table.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let Arguments { changes, field, speeds, spacing, replications, seed } = arguments;
     // In the order of `totals`.

@@ -16,7 +16,6 @@ use ratatui::style::{Color, Modifier, Style, Stylize};
 use ratatui::text::Line;
 use ratatui::widgets::{Block, Paragraph};
 
-/// Draws all of it.
 pub fn draw(model: &Model, frame: &mut Frame) {
     match model.rows.as_slice() {
         [row] => one::draw(model, row, frame),

@@ -19,7 +19,6 @@ const ROOMY: u16 = 16;
 const NAME: usize = 8;
 const WIDE: u16 = 60;
 
-/// Draws the rows.
 pub fn draw(model: &Model, rows: &[RowModel], frame: &mut Frame) {
     let area = frame.area();
     let is_roomy = area.height >= ROOMY;
@@ -95,7 +94,6 @@ fn draw_list(model: &Model, rows: &[RowModel], frame: &mut Frame, area: Rect) {
     frame.render_widget(Paragraph::new(lines), area);
 }
 
-/// A row's line.
 fn line(row: &RowModel, name: usize, columns: u16, is_target: bool) -> Line<'static> {
     let (state, style) = state(row);
     let mark = match row.answer {
