@@ -138,10 +138,7 @@ fn attack<'a, T>(host: &'a str, text: &'a str, meanwhile: impl FnOnce() -> T) ->
 /// over open and new connections. The text is made for a host, with the cookie of another paired phone. An attacker at
 /// the computer itself takes the places of its own open connections, unless `keeps_open`.
 fn hold_is_obeyed_under(name: &str, keeps_open: bool, text: impl Fn(&str, &str) -> String) {
-    let folder = folder();
-    let (_uno, port) = uno(&folder, "uno", &["--stand"]);
-    let served = serve(&folder, &[&port], &["--allow-start"]);
-    served.make_ready(0);
+    let (served, _uno) = serve_uno(&[], &["--allow-start"]);
     let (phone, other) = (served.pair(), served.pair());
     for attacked in [&served.lan, &served.here] {
         let mut watching = Events::open(&served.lan, &phone, 0);
@@ -183,18 +180,11 @@ fn hold_is_obeyed_under_an_attack_of_half_open_connections() {
 /// The server accepts all of them before it reads from any, so that each place is taken and lost at once.
 #[test]
 fn a_hold_is_read_despite_a_crowd_of_half_open_connections() {
-    let folder = folder();
-    let (_uno, port) = uno(&folder, "uno", &["--stand"]);
-    let served = serve(&folder, &[&port], &["--allow-start"]);
-    served.make_ready(0);
+    let (served, _uno) = serve_uno(&[], &["--allow-start"]);
     let phone = served.pair();
-    let signal = |name: &str| {
-        let id = served.process.0.id().to_string();
-        assert!(Command::new("kill").args([name, &id]).status().expect("kill is there").success());
-    };
     for (host, cookie) in [(&served.lan, phone.as_str()), (&served.here, "")] {
         assert_eq!(served.command(&served.here, "", "start").0, 200);
-        signal("-STOP");
+        served.process.signal("-STOP");
         let half_open = |number: u8| {
             let stream = connect_from([127, 0, 1, number], host);
             (&stream).write_all(b"GET / HTTP/1.1\r\n").expect("it is connected");
@@ -207,7 +197,7 @@ fn a_hold_is_read_despite_a_crowd_of_half_open_connections() {
         // Its client sends nothing more, as one that gives up or ends.
         client.get_mut().shutdown(Shutdown::Write).expect("it is connected");
         crowd.extend((100..250).map(half_open));
-        signal("-CONT");
+        served.process.signal("-CONT");
         assert_eq!(answer(&mut client), (200, "ok\n".to_owned()));
     }
 }
@@ -245,10 +235,7 @@ fn hold_is_obeyed_under_an_attack_of_files_that_are_not_read() {
 
 #[test]
 fn a_request_in_chunks_or_with_two_lengths_is_refused() {
-    let folder = folder();
-    let (_uno, port) = uno(&folder, "uno", &["--stand"]);
-    let served = serve(&folder, &[&port], &[]);
-    served.make_ready(0);
+    let (served, _uno) = serve_uno(&[], &[]);
     let phone = served.pair();
     let send =
         |host: &str, cookie: &str, rest: &str| raw(host, &request(host, cookie, "POST", "/machines/0/command", rest));
@@ -305,10 +292,7 @@ fn files(process: &Running) -> usize {
 
 #[test]
 fn a_stream_that_hardly_reads_is_closed_before_buffers_fill() {
-    let folder = folder();
-    let (_uno, port) = uno(&folder, "uno", &["--stand"]);
-    let served = serve(&folder, &[&port], &[]);
-    served.make_ready(0);
+    let (served, _uno) = serve_uno(&[], &[]);
     let phone = served.pair();
     // Long enough for the timeouts of all previous requests.
     let mut watching = Events::open(&served.lan, &phone, 0);

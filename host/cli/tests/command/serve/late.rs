@@ -5,6 +5,7 @@
 //! namespaces, that test prints so and tries nothing.
 
 use super::*;
+use crate::common::{printed, typed};
 
 /// The computer's and the phone's address, and the addresses of their network cards.
 const COMPUTER: &str = "10.77.0.1";
@@ -60,10 +61,7 @@ fn assert_came_after_hold(answer: &(u16, String)) {
 
 #[test]
 fn every_command_but_hold_states_what_its_sender_has_seen() {
-    let folder = folder();
-    let (_uno, port) = uno(&folder, "uno", &["--stand"]);
-    let served = serve(&folder, &[&port], &["--allow-start"]);
-    served.make_ready(0);
+    let (served, _uno) = serve_uno(&[], &["--allow-start"]);
     let phone = served.pair();
     let command = |seen: &str, line: &str| served.post_after(seen, &served.lan, "/machines/0/command", &phone, line);
     for seen in ["", "x", "-1"] {
@@ -82,41 +80,30 @@ fn every_command_but_hold_states_what_its_sender_has_seen() {
     assert_eq!(state(&served.lan, &phone), "state=work");
 }
 
-/// Sends a signal to a process.
-fn signal(process: &Running, name: &str) {
-    assert!(Command::new("kill").args([name, &process.0.id().to_string()]).status().expect("kill is there").success());
-}
-
 #[test]
 fn a_start_that_waited_while_the_computer_slept_is_refused() {
-    let folder = folder();
-    let (_uno, port) = uno(&folder, "uno", &["--stand", "--no-reset"]);
-    let served = serve(&folder, &[&port], &["--allow-start"]);
-    served.make_ready(0);
+    let (served, _uno) = serve_uno(&["--no-reset"], &["--allow-start"]);
     let cookie = served.pair();
     let mut phone = Phone::open(&served.lan, &cookie);
     let seen = served.seen(&served.lan, &cookie);
-    signal(&served.process, "-STOP");
+    served.process.signal("-STOP");
     phone.send("start", &seen);
     thread::sleep(Duration::from_millis(1500));
-    signal(&served.process, "-CONT");
+    served.process.signal("-CONT");
     assert_is_late(&phone.answer());
     assert_eq!(state(&served.lan, &cookie), "state=hold");
 }
 
 #[test]
 fn a_sleep_of_the_computer_is_no_silence_of_the_machine() {
-    let folder = folder();
     // A second connection would reset it, and its answers wait while the computer sleeps.
-    let (_uno, port) = uno(&folder, "uno", &["--stand"]);
-    let served = serve(&folder, &[&port], &["--allow-start"]);
-    served.make_ready(0);
+    let (served, _uno) = serve_uno(&[], &["--allow-start"]);
     assert_eq!(served.command(&served.here, "", "start"), (200, "ok\n".to_owned()));
     let mut events = Events::open(&served.here, "", 0);
     for _ in 0..3 {
-        signal(&served.process, "-STOP");
+        served.process.signal("-STOP");
         thread::sleep(Duration::from_millis(4000));
-        signal(&served.process, "-CONT");
+        served.process.signal("-CONT");
         for _ in 0..20 {
             let message = events.next().expect("it goes on");
             assert_ne!(message["is"], "lost", "{message}");
@@ -127,12 +114,9 @@ fn a_sleep_of_the_computer_is_no_silence_of_the_machine() {
 
 #[test]
 fn a_start_through_a_port_that_stalls_is_done_only_if_the_answer_says_so() {
-    let folder = folder();
-    let (uno, port) = uno(&folder, "uno", &["--stand", "--no-reset"]);
-    let served = serve(&folder, &[&port], &["--allow-start"]);
-    served.make_ready(0);
+    let (served, (uno, _folder)) = serve_uno(&["--no-reset"], &["--allow-start"]);
     let mut events = Events::open(&served.here, "", 0);
-    signal(&uno, "-STOP");
+    uno.signal("-STOP");
     // Mostly a poll is typed meanwhile. The command then waits behind it.
     thread::sleep(Duration::from_millis(300));
     let (status, said) = served.command(&served.here, "", "start");
@@ -140,7 +124,7 @@ fn a_start_through_a_port_that_stalls_is_done_only_if_the_answer_says_so() {
     // Typed before the poll, it is still in the port, which a pseudo terminal does not empty.
     let may_be_done = said.contains("may still do it");
     assert_eq!(status == 504, may_be_done, "{status} {said}");
-    signal(&uno, "-CONT");
+    uno.signal("-CONT");
     events.wait_for(|message| {
         assert!(may_be_done || !has(message, "said", "work"), "{message}");
         message["is"] == "there"
@@ -219,11 +203,7 @@ fn inside_the_namespace_of_the_phone() {
     let names: [&str; 2] = names.split(' ').collect::<Vec<_>>().try_into().expect("they are two");
     let folder = folder();
     let (_uno, port) = uno(&folder, "uno", &["--stand", "--no-reset"]);
-    let mut monitor = weeder();
-    monitor.args(["monitor", "--plain", "--port"]).arg(&port).stdin(Stdio::piped()).stdout(Stdio::null());
-    let mut monitor = monitor.spawn().expect("cargo has built it");
-    monitor.stdin.take().expect("it is piped").write_all(b"save\nclear\n").expect("it reads");
-    assert!(monitor.wait().expect("it ends").success());
+    printed(&typed(command(&["monitor", "--plain", "--port"]).arg(&port), "save\nclear\n"), 0);
     let mut command = Command::new("ip");
     command.args(["netns", "exec", names[0], env!("CARGO_BIN_EXE_weeder"), "serve"]);
     let served = serve_with(command, &folder, &[&port], &["--lan", COMPUTER, "--allow-start"]);
