@@ -7,7 +7,6 @@ use std::collections::VecDeque;
 use std::net::{Ipv4Addr, Shutdown};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Addresses of the attackers.
 const ATTACKERS: [[u8; 4]; 4] = [[127, 0, 0, 3], [127, 0, 0, 4], [127, 0, 0, 5], [127, 0, 0, 6]];
 
 /// Simultaneous connections of an attack.
@@ -39,24 +38,28 @@ fn is_open(stream: &TcpStream) -> bool {
     }
 }
 
-/// A client that keeps one connection.
-struct Client<'a> {
-    stream: BufReader<TcpStream>,
+pub(super) struct Client<'a> {
+    pub(super) stream: BufReader<TcpStream>,
     host: &'a str,
     cookie: &'a str,
 }
 
 impl<'a> Client<'a> {
-    fn open(host: &'a str, cookie: &'a str) -> Self {
+    pub(super) fn open(host: &'a str, cookie: &'a str) -> Self {
         Self { stream: BufReader::new(connect(host, 0)), host, cookie }
+    }
+
+    /// Sends a request with these further lines in its head. Does not wait for the answer.
+    pub(super) fn send(&mut self, method: &str, path: &str, head: &str, body: &str) {
+        let rest = format!("{head}Content-Length: {}\r\n\r\n{body}", body.len());
+        let text = request(self.host, self.cookie, method, path, &rest);
+        self.stream.get_mut().write_all(text.as_bytes()).expect("it is open");
     }
 
     /// Sends a request. Returns the status and the body.
     fn ask(&mut self, method: &str, path: &str, body: &str) -> (u16, String) {
-        let Self { stream, host, cookie } = self;
-        let request = request(host, cookie, method, path, &format!("Content-Length: {}\r\n\r\n{body}", body.len()));
-        stream.get_mut().write_all(request.as_bytes()).expect("it is open");
-        answer(stream)
+        self.send(method, path, "", body);
+        answer(&mut self.stream)
     }
 
     fn command(&mut self, line: &str) -> (u16, String) {

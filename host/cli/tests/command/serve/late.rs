@@ -4,6 +4,7 @@
 //! The network is the kernel's own, in two namespaces whose packets vanish for a while. Without the rights for
 //! namespaces, that test prints so and tries nothing.
 
+use super::attacks::{Client, answer};
 use super::*;
 use crate::common::{printed, typed};
 
@@ -17,28 +18,9 @@ const NO_CARD: &str = "02:00:00:00:77:99";
 /// The variable with the names of the namespaces, for the test that runs in the phone's.
 const NAMES: &str = "WEEDER_TEST_NAMESPACES";
 
-/// A phone's connection for one command at a time.
-struct Phone<'a> {
-    host: &'a str,
-    cookie: &'a str,
-    stream: BufReader<TcpStream>,
-}
-
-impl<'a> Phone<'a> {
-    fn open(host: &'a str, cookie: &'a str) -> Self {
-        Self { host, cookie, stream: BufReader::new(connect(host, 0)) }
-    }
-
-    /// Sends a command of a phone that has seen this message. Does not wait for the answer.
-    fn send(&mut self, line: &str, seen: &str) {
-        let seen = format!("Weeder-Seen: {seen}\r\nContent-Length: {}\r\n\r\n{line}", line.len());
-        let text = attacks::request(self.host, self.cookie, "POST", "/machines/0/command", &seen);
-        self.stream.get_mut().write_all(text.as_bytes()).expect("it is open");
-    }
-
-    fn answer(&mut self) -> (u16, String) {
-        attacks::answer(&mut self.stream)
-    }
+/// Sends a command of a phone that has seen this message. Does not wait for the answer.
+fn send(phone: &mut Client, line: &str, seen: &str) {
+    phone.send("POST", "/machines/0/command", &format!("Weeder-Seen: {seen}\r\n"), line);
 }
 
 /// The state of the machine, by a status that is sent after now.
@@ -84,13 +66,13 @@ fn every_command_but_hold_states_what_its_sender_has_seen() {
 fn a_start_that_waited_while_the_computer_slept_is_refused() {
     let (served, _uno) = serve_uno(&["--no-reset"], &["--allow-start"]);
     let cookie = served.pair();
-    let mut phone = Phone::open(&served.lan, &cookie);
+    let mut phone = Client::open(&served.lan, &cookie);
     let seen = served.seen(&served.lan, &cookie);
     served.process.signal("-STOP");
-    phone.send("start", &seen);
+    send(&mut phone, "start", &seen);
     thread::sleep(Duration::from_millis(1500));
     served.process.signal("-CONT");
-    assert_is_late(&phone.answer());
+    assert_is_late(&answer(&mut phone.stream));
     assert_eq!(state(&served.lan, &cookie), "state=hold");
 }
 
@@ -214,32 +196,32 @@ fn inside_the_namespace_of_the_phone() {
 
     // A start that comes seconds late, on a connection that its phone has given up or not.
     for gives_up in [false, true] {
-        let mut phone = Phone::open(host, &cookie);
+        let mut phone = Client::open(host, &cookie);
         let seen = served.seen(host, &cookie);
         connect_cable(names, false);
-        phone.send("start", &seen);
+        send(&mut phone, "start", &seen);
         if gives_up {
             phone.stream.get_mut().shutdown(std::net::Shutdown::Write).expect("it is open");
         }
         thread::sleep(Duration::from_millis(2500));
         connect_cable(names, true);
         if !gives_up {
-            assert_is_late(&phone.answer());
+            assert_is_late(&answer(&mut phone.stream));
         }
         assert_eq!(state(host, &cookie), "state=hold", "{gives_up}");
     }
 
     // A start, then HOLD on another connection. The start is sent again by the kernel, behind HOLD.
     for after_ms in [0, 100, 300, 600] {
-        let mut phones = [(); 2].map(|()| Phone::open(host, &cookie));
+        let mut phones = [(); 2].map(|()| Client::open(host, &cookie));
         let seen = served.seen(host, &cookie);
         connect_cable(names, false);
-        phones[0].send("start", &seen);
+        send(&mut phones[0], "start", &seen);
         thread::sleep(Duration::from_millis(after_ms));
         connect_cable(names, true);
-        phones[1].send("hold", "");
-        assert_eq!(phones[1].answer(), (200, "ok\n".to_owned()));
-        let (status, said) = phones[0].answer();
+        send(&mut phones[1], "hold", "");
+        assert_eq!(answer(&mut phones[1].stream), (200, "ok\n".to_owned()));
+        let (status, said) = answer(&mut phones[0].stream);
         // Before HOLD, or not at all.
         assert!(matches!(status, 200 | 412), "{status} {said}");
         assert_eq!(state(host, &cookie), "state=hold", "{after_ms} ms: {status} {said}");
