@@ -4,7 +4,6 @@ use crate::common::{self, assert_has, command, folder_with, told, weeder};
 use std::fs;
 use std::path::Path;
 
-/// Asserts that these words are refused with a message that contains `why`.
 #[track_caller]
 fn assert_refused(words: &str, why: &str) {
     common::assert_refused(Path::new("."), &words.split(' ').collect::<Vec<_>>(), why);
@@ -72,19 +71,6 @@ fn a_distance_other_than_the_setting_gets_a_warning() {
         let message = told(&weeder(folder.path(), &words));
         assert!(message.contains(warning) && message.contains("Warning") != warning.is_empty(), "{message}");
     }
-}
-
-#[test]
-fn a_row_that_no_machine_can_roll_along_is_refused_with_its_line() {
-    let folder = tempfile::tempdir().unwrap();
-    let row = folder.path().join("row.csv");
-    for position in ["4294967296", "18446744073709551616", "-1e300", "nan"] {
-        fs::write(&row, format!("position_mm,width_mm,kind\n500,150,plant\n{position},150,plant\n")).unwrap();
-        common::assert_refused(folder.path(), &["sim", "--row", "row.csv"], "row.csv, line 3: position_mm is ");
-    }
-    fs::write(&row, "position_mm,width_mm,kind\n-9e6,150,plant\n9e6,150,plant\n").unwrap();
-    let long = "line 3: the row is 36000 m long, with half a spacing at its ends: it has to be at most 6000 m";
-    common::assert_refused(folder.path(), &["sim", "--row", "row.csv"], long);
 }
 
 /// `FILE` stands for the file in arguments.

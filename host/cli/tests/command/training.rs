@@ -5,7 +5,6 @@ use std::fs;
 use study::training::MOST_EXAMPLES;
 use tempfile::TempDir;
 
-/// The table that the firmware is built from.
 const BUILT_IN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../control/src/ground/examples/table.rs");
 
 const HEADER: &str = "speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,label\n";
@@ -159,14 +158,6 @@ fn a_class_that_no_detection_has_gets_no_share() {
     let folder = folder_with("694,300,226,116,439,weed\n");
     let said = said(folder.path(), &["classify", "objects.csv"]);
     assert_has(&said, ["Plants classified as weeds   0 of 0, \u{2013}", "Weeds left standing          0 of 1, 0.00 %"]);
-}
-
-#[test]
-fn a_table_that_teaches_nothing_is_refused_with_file_and_line() {
-    let train = ["train", "objects.csv"];
-    assert_not_taken("", &train, "objects.csv, line 1: no line is below the header");
-    assert_not_taken("694,500,226,250,573,plant\n", &train, "objects.csv, line 2: up to here there is no label weed");
-    assert_not_taken("694,500,NaN,250,573,plant\n", &train, "objects.csv, line 2: delay_mm is `NaN`");
 }
 
 #[test]
