@@ -8,7 +8,6 @@ use tempfile::TempDir;
 /// A small field, so that a trial takes a moment.
 pub const SMALL: &str = "[plot]\nrows = 1\nrow_m = 6\n";
 
-/// A folder with this file.
 pub fn folder_with(name: &str, text: &str) -> TempDir {
     let folder = TempDir::new().expect("there is room for a folder");
     std::fs::write(folder.path().join(name), text).expect("there is room for a file");
@@ -61,7 +60,6 @@ pub fn assert_has<'a>(text: &str, parts: impl IntoIterator<Item = &'a str>) {
     }
 }
 
-/// Runs it with this input to its end.
 pub fn typed(weeder: &mut Command, input: impl AsRef<[u8]>) -> Output {
     let weeder = weeder.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut weeder = weeder.spawn().expect("cargo has built the command");

@@ -47,8 +47,7 @@ fn read_until(port: &mut dyn serialport::SerialPort, texts: &[&str]) -> String {
     String::from_utf8_lossy(&heard).into_owned()
 }
 
-/// Optiboot, the Uno's bootloader, compiled from the sources in arduino-core-avr. Debian's compiled file is longer than
-/// its boot section.
+/// Optiboot, the Uno's bootloader, compiled from arduino-core-avr. Debian's compiled file is too long.
 fn optiboot(folder: &Path) -> PathBuf {
     let (elf, hex) = (folder.join("optiboot.elf"), folder.join("optiboot.hex"));
     let mut compiler = Command::new("avr-gcc");
@@ -64,8 +63,7 @@ fn optiboot(folder: &Path) -> PathBuf {
     hex
 }
 
-/// Flashes an Uno with `weeder flash`. On a busy PC avrdude may miss the bootloader's time window, so this tries again,
-/// as a user would.
+/// Flashes an Uno. On a busy PC avrdude may miss the bootloader's time window: it tries again, as a user would.
 #[track_caller]
 fn flash(port: &Path, arguments: &[&str]) {
     let flashed = (0..5).any(|_| {
@@ -157,7 +155,6 @@ fn a_firmware_that_reaches_into_the_old_bootloader_is_refused() {
     );
 }
 
-/// A script that replaces avrdude.
 fn avrdude(folder: &Path, script: &str) {
     let avrdude = folder.join("avrdude");
     fs::write(&avrdude, format!("#!/bin/sh\n{script}")).unwrap();

@@ -11,7 +11,6 @@ use uno_run::firmware;
 use uno_run::live::Setup;
 use uno_run::live::rows::{Background, LiveRows};
 
-/// How many lines of a kind a log has by now.
 fn lines_of(log: &Path, kind: &str) -> usize {
     let text = fs::read_to_string(log).unwrap_or_default();
     text.lines().filter(|line| line.split(',').nth(1) == Some(kind)).count()

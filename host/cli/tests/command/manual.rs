@@ -40,7 +40,6 @@ const FOREIGN: [&str; 7] = ["avrdude", "cp", "echo", "npm", "scontrol", "squeue"
 /// Subcommands that need neither an Uno nor much time.
 const CHEAP: [&str; 9] = ["classify", "design", "evaluate", "hex", "merge", "plan", "sweep", "train", "trial"];
 
-/// A page of the manual.
 struct Page {
     path: PathBuf,
     text: String,
@@ -58,7 +57,6 @@ fn pages() -> Vec<Page> {
 }
 
 impl Page {
-    /// The lines of each fenced block in this language.
     fn blocks(&self, language: &str) -> Vec<Vec<&str>> {
         let mut blocks = Vec::new();
         let mut lines = self.text.lines();
@@ -222,7 +220,6 @@ fn commands_in_the_manual_that_need_no_uno_work() {
     }
 }
 
-/// All files in a folder and its subfolders.
 fn files_below(folder: &Path, files: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).expect("it is a folder") {
         let path = entry.expect("it can be read").path();

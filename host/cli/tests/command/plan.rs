@@ -5,8 +5,7 @@ use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 
-/// The table with every empty cell filled in. Damage and remaining weeds rise with speed. One block is good and one is
-/// bad.
+/// The table with every empty cell filled in. Damage and remaining weeds rise with speed, and blocks differ.
 fn filled_in(table: &str) -> String {
     let fill = |line: &str| {
         let cells: Vec<&str> = line.split(',').collect();

@@ -11,7 +11,6 @@ use uno::pty::Pty;
 /// Detections. The tool cuts none of them.
 const OBJECTS: &str = "speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,label\n694,500,226,250,573,plant\n";
 
-/// The manual's example of a trial.
 const TRIAL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/trial-example.csv");
 
 /// Commands of each kind that need no firmware, with a part of their output.
@@ -28,7 +27,6 @@ const COMMANDS: [&[&str]; 10] = [
     &["completions", "bash"],
 ];
 
-/// Runs `weeder` with these arguments and this standard output.
 fn weeder(arguments: &[&str], stdout: impl Into<Stdio>) -> Output {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("objects.csv"), OBJECTS).unwrap();

@@ -17,7 +17,6 @@ use tempfile::TempDir;
 use uno::pty::Pty;
 use uno_run::by_the_manual::Novice;
 
-/// The page of the manual.
 const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/set-up.md");
 
 /// Selects the random fields and measurements.
@@ -39,8 +38,7 @@ pub(crate) fn weeded(conditions: &Conditions, replications: u32, seed: u64) -> T
     totals(&experiment.run(&Engine::Native, |_| ()).expect("it can be weeded"))[0]
 }
 
-/// Every machine after any set of these steps in any order. Each step may be the last, so sets that leave steps out are
-/// included.
+/// Every machine after any set of these steps in any order, also with steps left out.
 fn follow_all(
     novice: &Novice,
     rest: &[ManualStep],
@@ -173,7 +171,6 @@ fn the_steps_in_their_order_end_at_the_machine_that_is_set_up() {
     assert!((ours - theirs).abs() < 2.0, "{ours:.1} and {theirs:.1} %: {:?}", novice.conditions.settings);
 }
 
-/// The simulated machine, as on the page.
 pub(crate) fn machine_of_the_page() -> String {
     let page = fs::read_to_string(PAGE).expect("it is there");
     page.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).expect("it has a machine").to_owned()

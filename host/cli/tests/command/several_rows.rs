@@ -37,7 +37,6 @@ fn named(folder: &TempDir, count: usize) -> String {
     file
 }
 
-/// Runs `weeder` with these words and this input.
 fn weeder(words: &[&str], input: &str) -> Output {
     typed(&mut command(words), input)
 }

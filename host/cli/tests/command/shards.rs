@@ -9,7 +9,6 @@ use std::thread;
 use std::time::Duration;
 use tempfile::TempDir;
 
-/// A trial in it.
 const TRIAL: [&str; 5] = ["trial", "--field", "small.toml", "--seed", "7"];
 
 fn folder() -> TempDir {

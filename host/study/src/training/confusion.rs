@@ -13,7 +13,6 @@ use uno_run::report::number_table;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Confusion([[usize; CLASSES.len()]; 2]);
 
-/// All classes.
 const CLASSES: [Class; 3] = [Class::Plant, Class::Unknown, Class::Weed];
 
 impl FromIterator<(Kind, Class)> for Confusion {
@@ -27,7 +26,6 @@ impl FromIterator<(Kind, Class)> for Confusion {
 }
 
 impl Confusion {
-    /// The detections of a kind that were classified as a class.
     fn of(&self, kind: Kind, class: Class) -> usize {
         self.0[kind as usize][class as usize]
     }

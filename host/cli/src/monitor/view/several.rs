@@ -22,8 +22,7 @@ const WIDE: u16 = 60;
 pub fn draw(model: &Model, rows: &[RowModel], frame: &mut Frame) {
     let area = frame.area();
     let is_roomy = area.height >= ROOMY;
-    // The top, a line of the console, the input, and the line below it. If there is room, also the console's frame and
-    // the advice.
+    // The top, a line of the console, the input, the line below it; with room, the console's frame and the advice.
     let others = if is_roomy { 3 + 3 + 1 } else { 3 };
     let room = usize::from(area.height.saturating_sub(others)).min(rows.len());
     let [top, list, advice, said, line, hint] =

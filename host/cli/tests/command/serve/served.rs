@@ -48,7 +48,6 @@ pub(super) fn uno(folder: &TempDir, name: &str, options: &[&str]) -> (Running, P
     (uno, link)
 }
 
-/// `weeder serve`.
 pub(super) struct Served {
     pub(super) process: Running,
     /// Its two hosts, and the code.
@@ -167,7 +166,6 @@ impl Served {
         (answer.status().as_u16(), answer.body_mut().read_to_string().expect("it is text"), cookie)
     }
 
-    /// Pairs a phone: its cookie.
     pub(super) fn pair(&self) -> String {
         let (status, said, cookie) = self.try_code(&self.code);
         assert_eq!(status, 204, "{said}");
@@ -189,7 +187,6 @@ impl Served {
     }
 }
 
-/// Whether a message has this in a field.
 pub(super) fn has(message: &Value, field: &str, words: &str) -> bool {
     message[field].as_str().is_some_and(|text| text.contains(words))
 }

@@ -42,7 +42,6 @@ fn set_up_before() -> (TempDir, Running) {
     (folder, uno)
 }
 
-/// Types lines on the console.
 fn typed_on_the_console(folder: &Path, lines: &str) {
     let mut monitor = command(&["monitor", "--plain", "--port", "./uno"]);
     printed(&typed(monitor.current_dir(folder), lines), 0);
