@@ -24,7 +24,6 @@ pub struct Arguments {
 /// The rows whose swings are compared with their ideal positions.
 const ROWS: u64 = 50;
 
-/// Measures and prints the figures.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let bench_elf = firmware::BENCH.elf()?;
     let elf = firmware::build()?;

@@ -29,7 +29,6 @@ pub struct Arguments {
     options: Options,
 }
 
-/// Proves and prints.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let mut options = arguments.options.clone();
     if options.budgets.is_none() {
@@ -63,7 +62,6 @@ pub struct Firmware {
     unproved: bool,
 }
 
-/// The risk of an unproved firmware.
 const RISK: &str = "its stack may overwrite its data, and plants may be missed, without an alarm";
 
 impl Firmware {

@@ -54,7 +54,6 @@ pub struct Arguments {
     replace: Replace,
 }
 
-/// Checks, and prints the report.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let page = arguments.page.as_ref().map(|page| page.file(arguments.replace)).transpose()?;
     let second = arguments.second_simulator.as_deref();

@@ -35,7 +35,6 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Classifies, and prints a line for each detection. With labels it also prints the confusion matrix.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let objects = table::read(&arguments.file)?;
     let mut model = Model::built_in();
@@ -53,7 +52,6 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     Ok(Finding::of(confusion.plants_taken_for_weeds() == 0))
 }
 
-/// The class of each detection, with its votes.
 fn as_json(model: &Model, objects: &[Recorded]) -> Result<Value> {
     let row = |(number, object): (usize, &Recorded)| {
         let answer = model.answer(&object.features)?;

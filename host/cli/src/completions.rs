@@ -20,7 +20,6 @@ pub struct Arguments {
     shell: Shell,
 }
 
-/// Prints the script that the shell reads.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let mut command = program::grammar::<crate::Arguments>();
     let mut script = Vec::new();

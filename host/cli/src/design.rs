@@ -32,7 +32,6 @@ pub struct Arguments {
     print_machine: bool,
 }
 
-/// Calculates and prints.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let own = arguments.machine.as_deref().map(file::read).transpose()?;
     let machine = own.unwrap_or_default();

@@ -46,7 +46,6 @@ pub struct Arguments {
     replace: Replace,
 }
 
-/// Reads, evaluates and prints.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let folder = arguments.out.as_ref().map(|out| out.folder([REPORT], arguments.replace)).transpose()?;
     let mut records = evaluation::read_csv(&arguments.file)?;

@@ -76,7 +76,6 @@ Example: weeder examples push chilli.csv --replace")]
     },
 }
 
-/// Pulls, pushes or compares.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     match &arguments.action {
         Action::Pull { file, replace, json, port } => {
@@ -163,8 +162,7 @@ fn examples_of(numbered: Vec<(u16, Taught)>) -> Vec<Taught> {
     numbered.into_iter().map(|(_, example)| example).collect()
 }
 
-/// A table's examples. Equal ones stay, because each votes. Only a table without lines has none. Fails if it is no such
-/// table.
+/// A table's examples. Equal ones stay, because each votes. Fails if it is no such table, or has lines and no label.
 pub fn in_table(file: &Path) -> Result<Vec<Taught>> {
     let objects = table::read_or_empty(file)?;
     let labelled = objects.iter().filter_map(|object| Some(example_of(&object.features, label_of(object.kind?))));
@@ -196,8 +194,7 @@ fn refuse_contradictions(wanted: &[Taught]) -> Result<()> {
     )
 }
 
-/// An example in millimetres. `None` for bytes that no detection has: examples from a machine or a table have no such
-/// bytes.
+/// An example in millimetres. `None` for bytes that no detection has: neither a machine nor a table has them.
 fn object(example: &Taught) -> Option<Labelled> {
     let kind = if example.label == label_of(Kind::Plant) { Kind::Plant } else { Kind::Weed };
     features_of(example).map(|features| Labelled { features, kind })

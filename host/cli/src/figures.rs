@@ -31,7 +31,6 @@ pub struct Arguments {
 /// The text before a figure's command.
 const MARK: &str = "<!-- figures: ";
 
-/// Writes the figures, or compares them.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let mut differ = Vec::new();
     for path in &arguments.pages {

@@ -89,8 +89,7 @@ fn room(bootloader: Bootloader, converter: Option<&str>) -> usize {
     if converter.is_some() { OLD.available } else { bootloader.available }
 }
 
-/// Seconds from the reset until the firmware starts: the bytes go to the Uno and back, a page takes 5 ms to write, and
-/// the bootloader waits.
+/// Seconds from the reset to the start: the bytes go both ways, a page takes 5 ms to write, the bootloader waits.
 fn seconds(bytes: usize, baud: u32) -> u32 {
     let bytes = bytes as f64;
     (2.0 + 2.0 * bytes * 10.0 / f64::from(baud) + bytes / 128.0 * 0.005).ceil() as u32

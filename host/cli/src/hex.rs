@@ -27,7 +27,6 @@ pub struct Arguments {
     firmware: Firmware,
 }
 
-/// Writes it.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let out = arguments.out.file(arguments.replace)?;
     let elf = arguments.firmware.elf()?;

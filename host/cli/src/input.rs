@@ -11,7 +11,6 @@ use std::thread;
 /// The greatest length of a line in bytes, or units of UTF-16: more than a row's name and a command.
 const LIMIT: usize = 200;
 
-/// A line of the input.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Line {
     /// Its number, counted from 1.
@@ -20,7 +19,6 @@ pub struct Line {
     pub text: String,
 }
 
-/// How the input writes its characters.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Encoding {
     Utf8,
@@ -56,7 +54,6 @@ impl Encoding {
         }
     }
 
-    /// The text of these bytes or units.
     fn text(self, codes: &[u16]) -> String {
         match self {
             Self::Utf8 => {
@@ -68,7 +65,6 @@ impl Encoding {
     }
 }
 
-/// Collects bytes to lines.
 #[derive(Default)]
 struct Lines {
     encoding: Option<Encoding>,
@@ -201,7 +197,6 @@ mod tests {
         ]
     }
 
-    /// The bytes of a character.
     fn encoded(character: char, encoding: &str) -> Vec<u8> {
         let units = || character.encode_utf16(&mut [0; 2]).to_vec();
         match encoding {

@@ -131,7 +131,6 @@ enum Command {
     Completions(Box<completions::Arguments>),
 }
 
-/// Runs a command and returns its finding.
 fn run(command: Command) -> Result<Finding> {
     match command {
         Command::Sim(arguments) => row::run(&arguments),
@@ -196,7 +195,13 @@ mod tests {
     use std::collections::BTreeSet;
     use std::ffi::OsString;
     use std::fs;
-    use std::path::PathBuf;
+    use std::path::{Path, PathBuf};
+
+    /// A command line without quotes. `DIR` is this folder.
+    fn parsed(words: &str, folder: &Path) -> Result<Arguments, clap::Error> {
+        let words = format!("weeder {words}").replace("DIR", folder.to_str().expect("it is text"));
+        parse(words.split(' ').map(OsString::from).collect())
+    }
 
     #[test]
     fn the_arguments_are_well_formed() {
@@ -221,8 +226,7 @@ mod tests {
         for (name, command) in commands() {
             for option in command.get_arguments().filter(|option| option.get_action().takes_values()) {
                 let Some(long) = option.get_long() else { continue };
-                let words = format!("weeder {name} --{long} -1");
-                let Err(error) = parse::<Arguments>(words.split(' ').map(OsString::from).collect()) else { continue };
+                let Err(error) = parsed(&format!("{name} --{long} -1"), Path::new("")) else { continue };
                 let said = error.to_string();
                 assert!(!said.contains("unexpected argument"), "{name} --{long}: {said}");
                 let Some((_, rest)) = said.split_once("number from ") else { continue };
@@ -289,7 +293,6 @@ mod tests {
         ("trial:out", "trial --shard 1/2 --out DIR/new.part", &["new.part"]),
     ];
 
-    /// The report of a trial.
     const TRIAL: [&str; 3] = ["reports/report.html", "reports/trial.csv", "reports/controllers.csv"];
 
     /// Whether it takes free text or a path, without its own parser or list of values.
@@ -353,11 +356,7 @@ mod tests {
         fs::write(path("log.csv"), "time_ms,kind,line\n0,connected,0.2.0\n").unwrap();
         let filled = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/trial-example.csv");
         fs::copy(filled, path("filled.csv")).unwrap();
-        let run = |words: &str| {
-            let words = format!("weeder {words}").replace("DIR", folder.path().to_str().expect("it is text"));
-            let words = words.split(' ').map(OsString::from).collect();
-            run(parse::<Arguments>(words).unwrap_or_else(|error| panic!("{error}")).command)
-        };
+        let run = |words: &str| run(parsed(words, folder.path()).unwrap_or_else(|error| panic!("{error}")).command);
         let small = "--field DIR/small.toml --shard 1/1 --out";
         run(&format!("trial --speeds 2 --spacings 50 {small} DIR/trial.part")).expect("it computes a part");
         run(&format!("sweep --x k=1..1:1 {small} DIR/sweep.part")).expect("it computes a part");
@@ -389,11 +388,8 @@ mod tests {
     #[test]
     fn an_output_is_no_other_file_of_its_command() {
         let folder = tempfile::tempdir().expect("there is room for a folder");
-        let refusal = |words: &str| {
-            let words = format!("weeder {words}").replace("DIR", folder.path().to_str().expect("it is text"));
-            let parsed = parse::<Arguments>(words.split(' ').map(OsString::from).collect());
-            parsed.err().map(|error| error.to_string()).unwrap_or_default()
-        };
+        let refusal =
+            |words: &str| parsed(words, folder.path()).err().map(|error| error.to_string()).unwrap_or_default();
         for words in [
             "plan --out DIR/new --sheets DIR/./new",
             "train --synthetic --out DIR/new.csv --picture DIR/new.csv",

@@ -57,7 +57,6 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Reads the records, writes the map, and prints the count.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let replace = arguments.replace;
     let out = arguments.out.file(replace)?;
@@ -160,7 +159,6 @@ fn name(path: &Path, logs: &[PathBuf]) -> String {
     name.map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
 }
 
-/// The counts in words, as a table.
 fn rows(summary: &Summary) -> [(&'static str, String); 22] {
     let mm = |value: Option<f64>| value.map_or("unknown".to_owned(), |value| format!("{value:.0}"));
     [

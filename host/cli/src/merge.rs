@@ -31,7 +31,6 @@ pub struct Arguments {
     shown: Shown,
 }
 
-/// Puts them together and prints the result.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let Arguments { parts, shown } = arguments;
     let parts = parts.iter().map(|path| open(path)).collect::<Result<Vec<_>>>()?;

@@ -71,7 +71,6 @@ fn addressed<'a>(line: &'a str, names: &[String], chosen: Option<usize>) -> Resu
     }
 }
 
-/// Watches until the user quits.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let chosen = arguments.ports.choose(None)?;
     let logs = arguments.log.as_deref().map(|out| Logs::open(out, &chosen)).transpose()?;

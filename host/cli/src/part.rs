@@ -54,8 +54,7 @@ pub struct Part {
 }
 
 impl Part {
-    /// The part of a shard, if the user asks for one. Fails if the file could not be written, or this program cannot be
-    /// read.
+    /// The part of a shard, if the user asks for one. Fails if its file or this program cannot be used.
     pub fn asked(shard: Option<Shard>, out: Option<&OutName>, replace: Replace) -> Result<Option<Self>> {
         let Some((shard, out)) = shard.zip(out) else { return Ok(None) };
         Ok(Some(Self { shard, out: out.file(replace)?, program: program()?, began: Instant::now() }))
@@ -84,7 +83,6 @@ impl Part {
     }
 }
 
-/// This program.
 pub fn program() -> Result<Program> {
     let file = env::current_exe().context("the running program cannot be found")?;
     Ok(Program { version: env!("WEEDER_VERSION").to_owned(), build: check_sum(&file)? })

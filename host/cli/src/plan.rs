@@ -43,7 +43,6 @@ pub struct Arguments {
     replace: Replace,
 }
 
-/// Creates the plan and prints or writes it.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let out = arguments.out.as_ref().map(|out| out.file(arguments.replace)).transpose()?;
     let sheets = arguments.sheets.as_ref().map(|sheets| sheets.file(arguments.replace)).transpose()?;

@@ -97,12 +97,9 @@ impl Port {
     }
 }
 
-/// A port, and a row's name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Named {
-    /// The name, if one was given.
     pub name: Option<String>,
-    /// The port.
     pub port: String,
 }
 
@@ -195,7 +192,6 @@ fn every_row(names: &Names, beside: Option<&str>) -> Result<Vec<Row>> {
 }
 
 impl Chosen {
-    /// The rows' names, in their order.
     pub fn names(&self) -> Vec<String> {
         self.rows.iter().map(|row| row.name.clone()).collect()
     }

@@ -106,7 +106,6 @@ impl GpsArguments {
     }
 }
 
-/// A receiver at its port.
 pub struct Gps {
     /// The row whose log has its lines.
     pub row: usize,
@@ -116,14 +115,12 @@ pub struct Gps {
     recorder: Recorder,
 }
 
-/// Where its bytes come from.
 enum Source {
     Port(Box<dyn Read + Send>),
     /// The port is lost. It is opened again then.
     Lost(Instant),
     /// A file's pieces, and when the first was due. `None` before the first turn.
     File(VecDeque<Piece>, Option<Instant>),
-    /// The file has ended.
     Ended,
 }
 
@@ -173,7 +170,6 @@ impl Gps {
         }
     }
 
-    /// The summary of the receiver at the end.
     pub fn summary(&self) -> String {
         let counts = self.recorder.counts();
         format!(

@@ -16,7 +16,6 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-/// Time between two checks whether to end.
 const LOOK: Duration = Duration::from_millis(20);
 /// Most events between two looks at the receiver.
 const MOST_EVENTS: usize = 64;
@@ -42,7 +41,6 @@ pub struct Arguments {
     gps: GpsArguments,
 }
 
-/// Records until Ctrl-C.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let chosen = arguments.ports.choose(arguments.gps.port())?;
     let gps = arguments.gps.open(&chosen)?;
@@ -87,7 +85,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     logs.end()
 }
 
-/// Tells the user what has happened to a row.
 fn tell_of(chosen: &Chosen, row: usize, happening: Happening) {
     match happening {
         Happening::Connected { version, shown, .. } => {
@@ -128,14 +125,12 @@ pub fn open(chosen: &Chosen) -> Result<(Rows, usize)> {
     bail!("none of the {} rows is there", rows.count());
 }
 
-/// A log for each row.
 pub struct Logs(Vec<Log>);
 
 struct Log {
     path: PathBuf,
     writer: LogWriter,
     is_written: bool,
-    /// The time of the last line.
     last_ms: u64,
 }
 

@@ -20,7 +20,6 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Replays, and prints on what log and replay agree.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let name = arguments.log.display();
     let replayed = replay::replay(&log::read(&arguments.log)?).with_context(|| format!("{name} cannot be replayed"))?;

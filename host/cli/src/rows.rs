@@ -55,7 +55,6 @@ enum Action {
     },
 }
 
-/// Lists, names or forgets.
 pub fn run(arguments: &Arguments) -> Result<()> {
     match &arguments.action {
         None => list(&arguments.file.read()?, arguments.json),
@@ -86,7 +85,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 struct Line {
     name: Option<String>,
     board: Board,
-    /// Its present port.
     port: Option<String>,
 }
 

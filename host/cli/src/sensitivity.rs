@@ -107,8 +107,7 @@ impl Change {
     }
 }
 
-/// The firmware's setting in a field: the field's own, the machine's distance, or the default. `None` if it follows from
-/// the speed.
+/// The firmware's setting in a field: its own, the machine's, or the default. `None` if it follows from the speed.
 fn setting(field: &Conditions, name: &str) -> Option<f64> {
     let own = field.settings.get(name).map(|&value| f64::from(value));
     own.or(match Setting::find(name.as_bytes())? {
@@ -139,7 +138,6 @@ fn rows(changed: &[Experiment]) -> String {
     format!("{count} rows of {row_m} m {lines}")
 }
 
-/// Runs it and prints the table.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let Arguments { changes, field, speeds, spacing, replications, seed } = arguments;
     // In the order of `totals`.

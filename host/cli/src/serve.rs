@@ -52,7 +52,6 @@ pub struct Arguments {
     http_port: u16,
 }
 
-/// Serves until Ctrl-C.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let page = match (&arguments.page, INSIDE) {
         (Some(folder), _) => Page::read(folder)?,

@@ -65,7 +65,6 @@ pub struct Arguments {
 /// More damaged plants than this, percent, are too many: a machine that was set up by the steps damages far fewer.
 const MOST_DAMAGED_PERCENT: f64 = 0.5;
 
-/// Leads through the steps.
 pub fn run(arguments: &Arguments) -> Result<()> {
     if arguments.simulated {
         return writeln!(Results, "{}\n{}", simulated::table()?, simulated::about());
@@ -167,7 +166,6 @@ impl Guide {
         self.summary(&steps)
     }
 
-    /// Forgets what these tasks have measured.
     fn forget(&mut self, tasks: &[Task]) {
         for task in tasks {
             match task {
@@ -359,7 +357,6 @@ impl Guide {
         self.set(&to_set, &calculated)
     }
 
-    /// Asks for settings, and sets them.
     fn set(&mut self, to_set: &[Setting], calculated: &[(Setting, u16)]) -> Result<()> {
         let wanted = self.values(to_set, calculated)?;
         self.agree(wanted, false).map(drop)
@@ -411,7 +408,6 @@ impl Guide {
         ended
     }
 
-    /// Sets and saves.
     fn push(&mut self, wanted: &[(Setting, u16)]) -> Result<()> {
         let set = settings::push(&mut self.link, wanted, &[], true)?;
         for setting in set {

@@ -76,7 +76,6 @@ Example: weeder settings push machine.toml --port /dev/ttyACM0")]
     },
 }
 
-/// Pulls, pushes or compares.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     match &arguments.action {
         Action::Pull { file, replace, json, ports } => pull(file.as_ref(), *replace, *json, &ports.choose(None)?),
@@ -188,7 +187,6 @@ impl Chosen {
         self.rows.iter().map(|row| Ok((row.name.clone(), wanted(&Self::file_in(file, row, "toml"))?))).collect()
     }
 
-    /// The file of a row's settings.
     fn file_of(&self, place: usize, file: &Path) -> PathBuf {
         match self.rows.get(place) {
             Some(row) if file.is_dir() => Self::file_in(file, row, "toml"),

@@ -69,7 +69,6 @@ impl Study {
     }
 }
 
-/// Runs it and prints what it has shown, or writes a part of it.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let &Arguments { hours, uno_minutes, seed, faults, json, .. } = arguments;
     ensure!(

@@ -121,7 +121,6 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Runs it and prints the result, or writes a part of it.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let &Arguments { ref out, replace, json, ref result, .. } = arguments;
     let sweep = Sweep {

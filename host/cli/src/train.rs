@@ -102,7 +102,6 @@ fn votes(text: &str) -> Result<Votes, String> {
     Err(format!("it has to be auto or a number from 1 to {}", training::MAX_K))
 }
 
-/// Trains, and prints the result.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let replace = arguments.replace;
     let table = arguments.out.as_ref().map(|out| destination(out, replace)).transpose()?;
@@ -272,7 +271,6 @@ impl Display for Fresh {
     }
 }
 
-/// The report of a training.
 fn report(training: &Training, objects: &[Labelled], fresh: &Fresh) -> Result<()> {
     writeln!(Results, "Detections  {}", objects.len())?;
     writeln!(Results, "k           {}", training.k)?;

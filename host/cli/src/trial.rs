@@ -181,10 +181,8 @@ pub struct Study {
     words: Vec<String>,
 }
 
-/// The outcome of a plot.
 #[derive(Serialize, Deserialize)]
 pub struct PlotPart {
-    /// By each controller.
     by_controller: Vec<PlotOutcome>,
     /// The first plot also has the report's picture of a row: the merging machine may have no firmware.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -193,7 +191,6 @@ pub struct PlotPart {
 
 const REPORT: [&str; 3] = ["report.html", "trial.csv", "controllers.csv"];
 
-/// Runs it and prints the result, or writes a part of it.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let &Arguments { replace, json, brief, .. } = arguments;
     let part = Part::asked(arguments.shard, arguments.out.as_ref(), replace)?;

@@ -33,8 +33,7 @@ const PAPER_MARGIN_MM: f64 = 50.0;
 /// Clear stretches shorter than this belong to the canopy: the firmware's default.
 const GAP_MM: f64 = 21.0;
 
-/// Detections narrower than this are no plants: half way between the built-in examples' widest weed and narrowest
-/// plant.
+/// Narrower detections are no plants: half way between the built-in examples' widest weed and narrowest plant.
 const NARROWEST_PLANT_MM: f64 = 60.0;
 
 /// A turn of the ideal controller's loop, in seconds.

@@ -74,8 +74,7 @@ pub struct Reason {
 }
 
 impl Budget {
-    /// The budget of one row. `weeded_mm` is a union of the ground that the tool worked. The reasons cover the whole
-    /// motion.
+    /// A row's budget. `weeded_mm` is a union of the ground that the tool worked. The reasons cover the whole motion.
     pub fn of(
         span_mm: &Range<f64>,
         weeded_mm: &[Range<f64>],

@@ -107,8 +107,7 @@ struct Strays {
 const PLAY_MM: Range<f64> = 200.0..600.0;
 
 impl Steering {
-    /// A machine that strays by up to `within_mm` on this ground, with a tool that has up to `play_mm` of play to either
-    /// side.
+    /// A machine that strays by up to `within_mm` on this ground. Its tool has up to `play_mm` of play to either side.
     pub(crate) fn within(within_mm: f64, play_mm: f64, ground_mm: Range<f64>, rng: &mut impl Rng) -> Self {
         let machine = Strays::within(within_mm, &ground_mm, LEG_MM, rng);
         Self { machine, tool: Strays::within(play_mm, &ground_mm, PLAY_MM, rng) }
@@ -124,7 +123,6 @@ impl Steering {
         self.machine.at_mm(place_mm) + self.tool.at_mm(place_mm)
     }
 
-    /// The largest deviation of the tool.
     pub(crate) fn tool_within_mm(&self) -> f64 {
         self.machine.within_mm + self.tool.within_mm
     }

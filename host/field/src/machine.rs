@@ -165,15 +165,13 @@ impl Machine {
         self.servo.stroke_degrees() - self.clear_within_degrees
     }
 
-    /// The angle from which on the tool's nearer edge is this far from the row's line. A tool that is fully out is far
-    /// enough.
+    /// The angle from which on the tool's nearer edge is this far from the row's line, or the tool is fully out.
     pub fn degrees_beside(&self, aside_mm: f64) -> f64 {
         let degrees = ((aside_mm + self.tool_width_mm / 2.0) / self.arm_mm).clamp(0.0, 1.0).asin().to_degrees();
         degrees.min(self.clear_degrees())
     }
 
-    /// The level of each beam's line at power-up, before the motion begins: the first beam's, and the second one's if
-    /// there is one.
+    /// The level of each beam's line at power-up, before the motion; of the second one's only if there is one.
     pub fn beams_before(&self, row: &Row, motion: &Motion) -> Vec<PinChange> {
         self.beams(&self.leaves_mm(row), motion.start_mm(), 0).iter().map(|beam| beam.last).collect()
     }

@@ -145,8 +145,7 @@ impl Motion {
         self.pieces.drain(..self.pieces.partition_point(|piece| piece.end_s <= time_s));
     }
 
-    /// Joins the last two pieces if their motion is alike. So a motion that is extended for hours does not fill the
-    /// memory.
+    /// Joins the last two pieces if their motion is alike, so that a motion of hours does not fill the memory.
     pub fn join(&mut self) {
         let [.., before, last] = self.pieces.as_mut_slice() else { return };
         let alike = |piece: &Piece| (piece.speed_mm_s, piece.acceleration_mm_s2, piece.wheel_mm_a_mm);

@@ -122,7 +122,6 @@ fn instant(turn: u32) -> Instant {
     Instant::new(turn.wrapping_mul(STEPS_A_TURN).wrapping_add(STILL_STEPS))
 }
 
-/// Types a line into the decisions' console.
 fn type_line(weeder: &mut Weeder, command: &str) -> Result<(), Refused> {
     match weeder.ask(command).pop() {
         Some(answer) if answer != "ok" => Err(Refused { command: command.to_owned(), answer }),

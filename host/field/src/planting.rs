@@ -14,22 +14,20 @@ use thiserror::Error;
 
 /// Why a planting cannot grow, and what would help.
 #[derive(Debug, Error, PartialEq)]
+#[expect(missing_docs, reason = "the messages say what each means")]
 pub enum PlantingError {
-    /// The weeds asked for do not fit.
     #[error(
         "there is no room for {} between the plants, {WEED_MARGIN_MM} mm from the next canopy: \
          ask for fewer weeds, or for a larger spacing",
         counted(.0, "tall weed")
     )]
     NoRoomForWeeds(usize),
-    /// The canopies do not fit into the spacing.
     #[error(
         "a spacing of {} mm leaves no room for canopies of {} mm: \
          spacing less its scatter has to exceed the canopy with its scatter",
         .0.spacing_mm, .0.canopy_mm
     )]
     NoRoomForPlants(Planting),
-    /// Nothing was planted.
     #[error(transparent)]
     Row(#[from] Problem),
 }
@@ -115,8 +113,7 @@ impl Planting {
         (1..=self.weeds).rev().find_map(|weeds| Self { weeds, ..*self }.grow(seed).ok()).map_or(fewest, Ok)
     }
 
-    /// Distributes the weeds over the gaps between neighbouring plants. A gap gets a second weed only if each gap has
-    /// one.
+    /// Distributes the weeds over the gaps between plants. A gap gets a second weed only if each gap has one.
     fn weeds_between(&self, plants: &[Canopy], rng: &mut impl Rng) -> Result<Vec<Canopy>, PlantingError> {
         let mut gaps: Vec<Range<f64>> =
             plants.windows(2).map(|pair| pair[0].span_mm().end..pair[1].span_mm().start).collect();
@@ -150,8 +147,7 @@ pub struct Sowing {
 }
 
 impl Sowing {
-    /// An endless row whose first plant's centre is at `first_mm`. The same seed gives the same row for the same
-    /// changes.
+    /// An endless row whose first plant's centre is at `first_mm`. The same seed and changes give the same row.
     pub fn new(planting: Planting, weed_share: f64, first_mm: f64, seed: u64) -> Self {
         Self { planting, weed_share, first_mm, rng: ChaCha8Rng::seed_from_u64(seed) }
     }

@@ -70,8 +70,7 @@ impl Rolling {
         }
     }
 
-    /// Rolls on until a cycle, and returns the pin changes until then. The cycle must not be before that of the last
-    /// call.
+    /// Rolls on until a cycle, not before that of the last call, and returns the pin changes until then.
     pub fn roll_until(&mut self, cycle: u64) -> Vec<PinChange> {
         let during_s = self.now_s()..time_at_s(self.start_cycle, cycle);
         let target_mm_s = self.target_mm_s;
@@ -111,8 +110,7 @@ impl Rolling {
         encoder.into_iter().filter(|_| !self.faults.encoder_dead).chain(beams).collect()
     }
 
-    /// Passes a pulse to the servo, after its falling edge. Returns true if it asks for another angle than the pulse
-    /// before it.
+    /// Passes a pulse to the servo, after its falling edge. Returns whether it asks for another angle than before.
     pub fn hear(&mut self, pulse: Pulse) -> bool {
         let last = self.pulses.last().copied();
         let servo = &self.machine.servo;
@@ -163,8 +161,7 @@ impl Rolling {
             .any(|canopy| canopy.blocks_mm().iter().any(|leaf| leaf.contains(&place_mm)))
     }
 
-    /// The motion from a time on, the pulses that the servo took as commands, and the cycle at which that motion
-    /// begins.
+    /// The motion from a time on, the pulses that the servo took as commands, and the cycle at which it begins.
     pub fn since(&self, time_s: f64) -> (Motion, &[Pulse], u64) {
         (self.motion.since(time_s), &self.pulses, cycle_at(self.start_cycle, time_s))
     }
@@ -189,7 +186,6 @@ impl Rolling {
     }
 }
 
-/// The canopies of a row on this ground.
 fn within<'a>(row: &'a [Canopy], ground_mm: &Range<f64>) -> impl Iterator<Item = &'a Canopy> {
     let first = row.partition_point(|canopy| canopy.span_mm().end < ground_mm.start);
     let behind = row.partition_point(|canopy| canopy.span_mm().start <= ground_mm.end);

@@ -54,8 +54,7 @@ pub struct Canopy {
     pub across_mm: f64,
     /// Plant or weed.
     pub kind: Kind,
-    /// The parts of its width where leaves break the beam, as positions along the row in ascending order. Empty for a
-    /// canopy without gaps.
+    /// The parts of its width where leaves break the beam, ascending positions along the row. Empty without gaps.
     pub leaves: Vec<Range<f64>>,
 }
 
@@ -131,27 +130,23 @@ impl Stem {
 
 /// The problem of a canopy or a row, and what would be right.
 #[derive(Debug, Error, PartialEq)]
+#[expect(missing_docs, reason = "the messages say what each means")]
 pub enum Problem {
-    /// The position is not a number, or out of range.
     #[error("position_mm is {0}: it has to be from -{MAX_POSITION_MM} to {MAX_POSITION_MM}, millimetres along the row")]
     Position(f64),
-    /// The width is out of range.
     #[error("width_mm is {0}: it has to be above 0 and at most {MAX_WIDTH_MM} mm")]
     Width(f64),
-    /// A canopy overlaps an earlier one.
     #[error(
         "the {} at {} mm and the {} at {} mm overlap: \
          each has to end before the next begins (plants that have grown together are one line)",
         .0[0].kind, .0[0].position_mm, .0[1].kind, .0[1].position_mm
     )]
     Overlap(Box<[Canopy; 2]>),
-    /// The row is too long.
     #[error(
         "the row is {} m long, with half a spacing at its ends: it has to be at most {} m",
         (.0 / 1000.0).ceil(), MAX_LENGTH_MM / 1000.0
     )]
     Length(f64),
-    /// The row is empty.
     #[error("the row is empty: it needs at least one plant or weed")]
     Empty,
 }
@@ -294,8 +289,7 @@ impl Row {
         Self::in_order(lines).map_err(|(line, problem)| line.error(problem.to_string()))
     }
 
-    /// Writes the row as a CSV table that [`Row::parse_csv`] reads. Gaps within a ragged canopy, dust and the row's
-    /// ends are lost.
+    /// Writes the row as a CSV table that [`Row::parse_csv`] reads, without gaps in canopies, dust and the row's ends.
     ///
     /// # Errors
     /// The errors of the writer.

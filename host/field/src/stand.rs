@@ -187,7 +187,6 @@ fn chance(rng: &mut impl Rng, percent: f64) -> bool {
     rng.random_bool((percent / 100.0).clamp(0.0, 1.0))
 }
 
-/// A random count with this mean.
 fn count(rng: &mut impl Rng, mean: f64) -> usize {
     // A mean of 0 has no distribution, but a result.
     Poisson::new(mean).map_or(0, |poisson| poisson.sample(rng) as usize)

@@ -131,8 +131,7 @@ fn print_all(waiting: Receiver<Printed>, output: &mut impl Write) -> bool {
     is_printed
 }
 
-/// The command as it was typed, for a report that says how to make it again. Fails if a word cannot be quoted for a
-/// shell.
+/// The command as typed, for a report that says how to repeat it. Fails if a word cannot be quoted for a shell.
 pub fn command_line() -> Result<String> {
     let words: Vec<_> = env::args_os().skip(1).collect();
     let words = words.iter().map(|word| word.to_string_lossy());

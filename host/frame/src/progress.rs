@@ -6,20 +6,17 @@ use indicatif::{ProgressBar, ProgressStyle};
 use std::process;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Steps of a full bar.
 const STEPS: u64 = 1000;
 
 /// How a shell knows of a command that Ctrl-C has ended.
 const INTERRUPTED: i32 = 130;
 
-/// The bar on the terminal.
 static SHOWN: Mutex<Option<ProgressBar>> = Mutex::new(None);
 
 /// Shows the share done.
 pub type Show<'a> = &'a (dyn Fn(f64) + Sync);
 
-/// Shows a bar behind a text during the work, if standard error is a terminal. The work tells the share done, from 0
-/// to 1.
+/// Shows a bar behind a text during the work, if standard error is a terminal. The work tells the share done, 0 to 1.
 pub fn with_bar<T>(words: &'static str, work: impl FnOnce(Show) -> T) -> T {
     let bar = ProgressBar::new(STEPS).with_message(words);
     if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar:.green} {percent:>3} %, {eta} to go") {

@@ -68,7 +68,6 @@ pub struct Arguments {
     json: bool,
 }
 
-/// The files of a report.
 const REPORT: [&str; 5] = ["row.svg", "weeding.svg", "row.csv", "plants.csv", "weeds.csv"];
 
 /// Runs it and prints the result. Fails if an argument or a file is wrong, or the firmware cannot be run.
@@ -88,7 +87,6 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
 }
 
 impl Arguments {
-    /// The name of its field.
     fn field(&self) -> &str {
         if self.paper { "paper" } else { &self.course.field }
     }

@@ -107,7 +107,6 @@ pub struct Event {
 }
 
 impl Event {
-    /// A mark at this distance.
     fn mark(kind: EventKind, text: String, line: u64, time_ms: f64, distance_m: f64) -> Self {
         let (time_ms, found) = (time_ms as u64, Err(Missing::NoFixBefore));
         Self { kind, line, text, time_ms, distance_m, width_mm: 0.0, found }

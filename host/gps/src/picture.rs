@@ -26,8 +26,7 @@ const LEAST_M: f64 = 5.0;
 #[derive(Clone, Debug, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Words {
-    /// The legend of the colours: ground weeded and not weeded, a plant, one that is unknown, a tall weed, a label, an
-    /// alarm.
+    /// The colours' legend: ground weeded and not weeded, a plant, an unknown one, a tall weed, a label, an alarm.
     pub legend: [String; 7],
     /// The text before the number of events without a position.
     pub without_place: String,

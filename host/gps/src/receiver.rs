@@ -34,8 +34,7 @@ pub const AGREEING_MS: f64 = 10_000.0;
 /// And the number of fixes that must agree.
 const AGREEING: usize = 5;
 
-/// The distance of two fixes, in standard deviations, that counts as a jump. Noise alone exceeds it in one case of ten
-/// million.
+/// The distance of two fixes, in standard deviations, that is a jump. Noise exceeds it once in ten million cases.
 const DEVIATIONS: f64 = 8.0;
 
 /// Further distance of two fixes of the best receiver, such as by the antenna's swaying, in metres.
@@ -51,7 +50,6 @@ const STEP_STAYS_MS: f64 = 2000.0;
 /// The greatest difference of such a rise from whole seconds, and between its lines, in ms.
 const STEP_JITTER_MS: f64 = 300.0;
 
-/// A moment, and the values received for it.
 #[derive(Clone, Copy, Debug, Default)]
 struct Moment {
     arrived_ms: f64,
@@ -97,8 +95,7 @@ pub struct Receiver {
     pub(crate) error_m: Option<f64>,
     /// The counts so far.
     pub counts: Counts,
-    /// The complete fixes that the caller has not taken yet. Several come at once if earlier fixes had jumped and are
-    /// accepted after all.
+    /// The complete fixes that the caller has not taken yet: several if fixes that had jumped are accepted after all.
     pub fixes: Vec<Fix>,
     /// The marks that the caller has not taken yet.
     pub marks: Vec<Mark>,

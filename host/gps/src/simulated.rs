@@ -107,8 +107,7 @@ impl SimulatedReceiver {
         forward * distance_m + beside.along(forward)
     }
 
-    /// The bytes up to this time, in seconds since the Uno was powered up. `distance_m` returns the distance travelled at a
-    /// time.
+    /// The bytes up to this time, in seconds since power-up. `distance_m` returns the distance travelled at a time.
     pub fn bytes_until(&mut self, time_s: f64, distance_m: impl Fn(f64) -> f64) -> Vec<u8> {
         let mut bytes = Vec::new();
         loop {

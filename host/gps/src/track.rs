@@ -252,7 +252,6 @@ pub(crate) struct Fitted {
 }
 
 impl Fitted {
-    /// Adds a fix.
     pub(crate) fn add(&mut self, station: &Station) {
         let (distance_m, at) = *self.origin.get_or_insert((station.distance_m, station.at));
         let (distance, at) = (station.distance_m - distance_m, station.at - at);

@@ -12,7 +12,6 @@ use link::Class;
 use logbook::log::{Entry, Kind};
 use proptest::prelude::*;
 
-/// Ticks in a millimetre.
 const TICKS_A_MM: f64 = 2.0;
 
 /// The machine rolls so fast, in mm/s.
@@ -263,8 +262,7 @@ fn a_change_of_wheel_and_its_revert_each_begin_a_stretch() {
     assert_eq!(Job::read(&log, &Wanted::default()).stretches.len(), 3);
 }
 
-/// The weeded ground of a machine that rolls to these distances in mm, in a state and with a tool. Its swings have no
-/// lines.
+/// The weeded ground of a machine that rolls to these distances in mm. Its swings have no lines.
 fn weeded_m(passes: &[(&str, &str, &[i64])]) -> f64 {
     let entry = |kind, text: &str| Entry { number: 1, time_ms: 0, kind, text: text.to_owned() };
     let mut log = vec![entry(Kind::Connected, "0.2.0"), entry(Kind::Setting, "ticks_per_m=2000")];

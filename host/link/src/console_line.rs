@@ -308,7 +308,6 @@ mod tests {
         }
     }
 
-    /// All lines of the firmware's answer to a command.
     fn answer(command: &str) -> Vec<ConsoleLine> {
         let examples = [Example::new([1, 2, 3, 4, 5], label::PLANT), Example::new([9, 8, 7, 6, 5], label::WEED)];
         let examples = Nearest::new(&examples[..], Volatile::new());

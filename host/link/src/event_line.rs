@@ -289,14 +289,12 @@ mod tests {
 
     pub(super) type Machine = Rig<ByExamples>;
 
-    /// The event as the firmware writes it.
     fn line(event: Event) -> String {
         let mut line = Line::new();
         write_event(&event, &mut line);
         line.map(char::from).collect::<String>().trim_end().to_owned()
     }
 
-    /// Any event.
     fn any(chance: &mut ChaCha8Rng) -> Event {
         let position = Position::new(chance.random());
         let alarm = (0..).map_while(Alarm::from_index).choose(chance).expect("there are alarms");

@@ -202,8 +202,7 @@ fn representative(first: i16, last: i16, lowest: i16) -> i16 {
     }
 }
 
-/// The class that the built-in examples clearly give, if it differs from the label. The machine refuses such a label
-/// unless it is forced.
+/// The class that the built-in examples clearly give, if the label is another. The machine refuses that unless forced.
 pub fn contradiction(example: &Taught) -> Option<Class> {
     let built_in = Nearest::new(EXAMPLES, Volatile::new()).built_in_class(&features_of(example)?);
     let other = if example.label == label::PLANT { Class::Weed } else { Class::Plant };

@@ -139,7 +139,6 @@ fn number(port: &SerialPortInfo) -> Option<(u16, u16)> {
     }
 }
 
-/// The name of an Uno or a converter.
 fn name(number: (u16, u16)) -> Option<&'static str> {
     let converter = || CONVERTERS.iter().find(|(known, _)| *known == number).map(|(_, name)| *name);
     if UNOS.contains(&number) { Some(UNO) } else { converter() }

@@ -141,7 +141,6 @@ impl Board {
     }
 }
 
-/// The port of the board with this serial number.
 fn numbered(number: &str, ports: &[SerialPortInfo]) -> Result<String, LinkError> {
     let has_it = |port: &&SerialPortInfo| serial_number(port).is_some_and(|found| found == number);
     let found: Vec<String> = ports.iter().filter(has_it).map(|port| port.port_name.clone()).collect();
@@ -191,8 +190,7 @@ pub fn plugged() -> Result<Vec<Plugged>, LinkError> {
     Ok(unos.map(|port| Plugged { port: port.port_name.clone(), board: board(port) }).collect())
 }
 
-/// Why a word cannot be a row's name, and what would be right. The name becomes part of a file name, and stands before
-/// a colon.
+/// Why a word cannot be a row's name, and what would be right. Names are parts of file names, and stand before a colon.
 pub fn wrong_with(name: &str) -> Option<String> {
     let length = name.chars().count();
     if length == 0 || length > NAME_LENGTH {

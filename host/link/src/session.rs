@@ -430,7 +430,6 @@ impl Session {
         }
     }
 
-    /// Takes the warning that the answer to `status` names.
     fn take_named(&mut self, named: Option<Warning>) {
         self.warn(self.warning.filter(|warning| UNTIL_HOLD.contains(warning)).or(named));
     }

@@ -50,7 +50,6 @@ pub fn write(path: &Path, shown: &Shown) -> Result<(), FileError> {
     written.map_err(|source| FileError::unwritten(path, source))
 }
 
-/// An error in the line where a text is no TOML.
 pub(super) fn no_toml(path: &Path, text: &str, error: &TomlError) -> FileError {
     let start = error.span().map_or(0, |span| span.start);
     FileError::at_byte(path, text, start, error.message().replace('\n', ", "))

@@ -12,7 +12,6 @@ use std::assert_matches;
 
 const VERSION: &[u8] = b"weeder 0.2.0\r\nok\r\n";
 
-/// A link over a port that answers each line by `answer`.
 fn over(resets: bool, mut answer: impl FnMut(&str) -> Vec<u8> + 'static) -> Result<Link, LinkError> {
     let script = move |line: Option<&str>| Some(line.map_or_else(Vec::new, &mut answer));
     Link::over(Wire::over(ScriptedPort::new(script), resets))
@@ -151,7 +150,6 @@ fn machine() -> impl FnMut(&str) -> Vec<u8> {
     move |line| (rig.ask(line).join("\r\n") + "\r\n").into_bytes()
 }
 
-/// A link to the machine, after these typed lines.
 fn link_to_machine(typed: &[&str]) -> Link {
     let mut machine = machine();
     typed.iter().for_each(|line| drop(machine(line)));

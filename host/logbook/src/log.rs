@@ -264,7 +264,6 @@ impl LogWriter {
         self.write_at(end, &bytes)
     }
 
-    /// Writes at the file's end.
     fn write_at(&mut self, end: u64, bytes: &[u8]) -> io::Result<()> {
         let written = self.file.write_all(bytes);
         // A full disk may have taken a part: that is no change by another program.

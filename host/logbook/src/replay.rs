@@ -150,7 +150,6 @@ struct Played {
     end: i32,
 }
 
-/// Replays a stretch and adds its result.
 fn replay_stretch(stretch: &Stretch, replayed: &mut Replayed, advance: &mut impl FnMut()) -> Result<(), ReplayError> {
     replayed.notes.extend_from_slice(&stretch.notes);
     if stretch.settings.get(Setting::SecondBeamMm) > 0 {

@@ -33,7 +33,6 @@ pub fn digits_beside(value: f64, decimals: usize) -> String {
     if decimals > significant_decimals(value) { format!("{value:.decimals$}") } else { digits(value) }
 }
 
-/// Decimals that make four significant digits.
 fn significant_decimals(value: f64) -> usize {
     let magnitude = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
     (3.0 - magnitude).clamp(0.0, 9.0) as usize

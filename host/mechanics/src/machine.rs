@@ -114,7 +114,6 @@ macro_rules! sections {
             }
         }
 
-        /// The title of each section of the file.
         const TITLES: &[(&str, &str)] = &[$((stringify!($section), concat!($($title),+))),+];
     };
 }

@@ -25,7 +25,6 @@ const ENGINE_EXCESS: f64 = 2.0;
 const SOFT_WHEEL_NUMERIC: f64 = 15.0;
 const TILLED_WHEEL_NUMERIC: f64 = 25.0;
 
-/// The figures of the tools between the rows.
 const BETWEEN_ROWS: [&str; 4] = ["sweep_width", "apex_angle", "inter_row_bending_moment", "inter_row_shank_diameter"];
 
 /// A line of interpretation, and whether it asks for a change.
@@ -52,7 +51,6 @@ macro_rules! figures {
     };
 }
 
-/// A share in whole percents.
 fn percent(share: Ratio) -> String {
     format!("{:.0} %", unit::PERCENT.value(share))
 }

@@ -5,7 +5,6 @@ use mechanics::figure::Figure;
 use mechanics::machine::Machine;
 use mechanics::unit::{COUNT, DEGREE, FACTOR, HP, KG_CM, KM_H, KPA, MM, NEWTON};
 
-/// The figure of this key after a change of the paper's machine.
 fn figure_with(key: &str, change: impl FnOnce(&mut Machine)) -> Figure {
     let mut machine = Machine::default();
     change(&mut machine);
@@ -13,7 +12,6 @@ fn figure_with(key: &str, change: impl FnOnce(&mut Machine)) -> Figure {
     figures.into_iter().find(|figure| figure.key == key).unwrap()
 }
 
-/// Asserts that a figure asks for a change or not, with these words.
 #[track_caller]
 fn assert_sense(figure: &Figure, concern: bool, words: &str) {
     assert!(figure.concern == concern && figure.sense.contains(words), "{figure:?}");

@@ -25,7 +25,6 @@ const WAITING: usize = 64;
 /// Most stored lines of an answer. The longest answer has less than a tenth.
 const LINES: usize = 1000;
 
-/// Time in which a machine has answered, or is lost.
 const ANSWER_TIME: Duration = Duration::from_secs(30);
 
 /// The machine's answer to a line; its last line is `ok`, or begins with `error:`.
@@ -236,7 +235,6 @@ mod tests {
         Box::new(move || Ok(Wire::over(port.open().ok_or(LinkError::Absent("it".to_owned()))?, false)))
     }
 
-    /// A connected machine.
     async fn machine() -> (Machine, Arc<Hub>, ScriptedBoard) {
         let (hub, board) = (Arc::new(Hub::new(1, 0, Box::new(Moment::now))), ScriptedBoard::plugged_in());
         let machine = Machine::start(0, "uno".to_owned(), opener(&board), Arc::clone(&hub), Arc::new(|_| {}));

@@ -12,7 +12,6 @@ use subtle::ConstantTimeEq;
 /// Characters of a code. I, L, O and U are left out, because they are easily misread.
 const ALPHABET: &[u8; 32] = b"0123456789ABCDEFGHJKMNPQRSTVWXYZ";
 
-/// Characters in a code.
 const CODE_LENGTH: usize = 8;
 
 /// Wrong codes after which codes are refused for some time.

@@ -50,7 +50,6 @@ use tokio::time::timeout;
 /// Bytes that a request's body has at the most: a command has 80.
 const BODY_BYTES: usize = 256;
 
-/// Time limit for the body.
 const BODY_TIME: Duration = Duration::from_secs(5);
 
 /// Time between heartbeats to a page. The page reports a lost computer after six times as long.
@@ -154,7 +153,6 @@ async fn admit(
     response
 }
 
-/// The values of the cookie with this name.
 fn cookies<'request>(headers: &'request HeaderMap, name: &str) -> impl Iterator<Item = &'request str> {
     let lines = headers.get_all(COOKIE).iter().filter_map(|value| value.to_str().ok());
     let pairs = lines.flat_map(|line| line.split(';')).filter_map(|pair| pair.trim().split_once('='));
@@ -344,7 +342,6 @@ fn is_malformed(error: &(dyn Error + 'static)) -> bool {
     std::iter::successors(Some(error), |&error| error.source()).any(|error| error.is::<hyper::Error>())
 }
 
-/// The error for a body that is no line.
 fn no_line() -> Response {
     refused(StatusCode::BAD_REQUEST, Forbidden::NoLine)
 }

@@ -202,7 +202,6 @@ impl Treatment {
     }
 }
 
-/// The plants of some plots that were damaged.
 fn damaged<'a>(records: impl IntoIterator<Item = &'a PlotRecord>) -> Share {
     let counts = records.into_iter().filter_map(|record| Response::PlantDamage.count(record));
     let (damaged, plants) =

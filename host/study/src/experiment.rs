@@ -57,8 +57,7 @@ pub enum ControllerKind {
     WithoutLookAhead,
     /// The paper's controller: one slot, no look-ahead, a polling loop.
     Paper,
-    /// The ideal controller: it knows every stem and allows for the servo's slowest swing. No controller can avoid the
-    /// damage that it does.
+    /// The ideal controller: it knows every stem and allows for the slowest swing. No other one avoids its damage.
     Ideal,
 }
 
@@ -203,8 +202,7 @@ impl Experiment {
         Ok(of_plots.into_iter().flat_map(|plot| plot.outcome).collect())
     }
 
-    /// Weeds a shard's plots. Returns for each plot an outcome of each controller. All shards together equal
-    /// [`Experiment::run`].
+    /// Weeds a shard's plots: for each an outcome of each controller. All shards together equal [`Experiment::run`].
     ///
     /// # Errors
     /// As [`Experiment::run`].

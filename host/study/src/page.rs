@@ -266,7 +266,6 @@ impl Bar {
     }
 }
 
-/// The loss budget as a table.
 fn losses(firmware: &[&Total]) -> Table {
     let titles = Part::ALL.map(|part| format!("{}, %", part.title()));
     let mut table = Table::new("Where the row's ground went", ["speed".to_owned()].into_iter().chain(titles));

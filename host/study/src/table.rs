@@ -83,8 +83,7 @@ pub fn fixed(value: f64, decimals: usize) -> String {
 /// Smaller numbers are rounding errors of 0.
 const ROUNDING: f64 = 1e-12;
 
-/// A number with `decimals` decimal places. A small one has two significant digits instead. Only a rounding error reads
-/// as 0.
+/// A number with `decimals` decimal places; a small one with two significant digits. Only a rounding error reads as 0.
 pub fn visible(value: f64, decimals: usize) -> String {
     let places = if value.abs() < ROUNDING { 0.0 } else { 1.0 - value.abs().log10().floor() };
     let reads_as_0 = value.abs() < 0.5 * 0.1_f64.powi(decimals as i32);

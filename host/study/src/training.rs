@@ -169,8 +169,7 @@ pub fn train(objects: &[Labelled], k: Option<u8>, most: usize) -> Result<Trainin
 /// Into how many parts the detections are divided, to hold out one after the other.
 const PARTS: usize = 5;
 
-/// Detections that a table was not learned from: each fifth of them, classified by a table of the others. The table of
-/// all is learned from some more.
+/// Detections that a table was not learned from: each fifth of them, classified by a table of the others.
 ///
 /// # Errors
 /// As [`train`], if four fifths teach nothing.
@@ -215,8 +214,7 @@ pub fn beside(objects: &[Labelled], k: Option<u8>, most: usize) -> Result<Beside
     Ok(Beside { chosen: chosen.into_iter().map(|index| objects[index]).collect(), before, after })
 }
 
-/// The radius, from the distances between detections of one class and of both. `edited` has the indices of the
-/// detections that are not noise.
+/// The radius, from the distances within one class and between both. `edited` has the indices of those without noise.
 fn learn_radius(examples: &[Example<COUNT>], edited: &[usize]) -> u32 {
     let distances = |of_one_class: bool| {
         let nearest = |&index: &usize| {

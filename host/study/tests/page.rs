@@ -6,6 +6,7 @@ use field::machine::Machine;
 use field::motion::Motion;
 use field::tool_path::{Effect, WeedCount};
 use roxmltree::{Document, Node, ParsingOptions};
+use std::sync::LazyLock;
 use study::evaluation::{Analysis, PlotRecord};
 use study::experiment::{ControllerKind, PlotOutcome, Total, Zones};
 use study::page::Page;
@@ -89,38 +90,40 @@ fn full_page() -> String {
     page_of(&totals())
 }
 
+/// The same, parsed once.
+fn full() -> Document<'static> {
+    static XML: LazyLock<String> = LazyLock::new(|| closed(&full_page()));
+    parse(&XML)
+}
+
 /// A page with all parts, of these totals.
 fn page_of(totals: &[Total]) -> String {
     let parameters = [("seed".to_owned(), "7".to_owned()), ("engine".to_owned(), "native".to_owned())];
     let (analysis, row) = (trial(true), row());
-    let page = Page {
-        title: "A trial",
-        summary: vec!["No plant was damaged.".to_owned(), "Most weeds are gone.".to_owned()],
-        paper: Vec::new(),
-        command: "weeder trial --seed 7",
-        parameters: &parameters,
-        analysis: &analysis,
-        log: None,
-        totals,
-        row: Some(&row),
-    };
+    let summary = vec!["No plant was damaged.".to_owned(), "Most weeds are gone.".to_owned()];
+    let command = "weeder trial --seed 7";
+    let page =
+        Page { summary, command, parameters: &parameters, totals, row: Some(&row), ..plain("A trial", &analysis) };
     page.html().unwrap()
 }
 
 /// A real trial's page, which has no comparison and no row.
-fn plain_page(title: &str, parameters: &[(String, String)], analysis: &Analysis) -> String {
-    let page = Page {
+fn plain<'a>(title: &'a str, analysis: &'a Analysis) -> Page<'a> {
+    Page {
         title,
         summary: analysis.findings(),
         paper: Vec::new(),
         command: "weeder evaluate",
-        parameters,
+        parameters: &[],
         analysis,
         log: None,
         totals: &[],
         row: None,
-    };
-    page.html().unwrap()
+    }
+}
+
+fn plain_page(title: &str, analysis: &Analysis) -> String {
+    plain(title, analysis).html().unwrap()
 }
 
 /// The page as XML, once the elements are closed that HTML leaves open.
@@ -152,9 +155,7 @@ fn cells(page: &Document, caption: &str) -> Vec<Vec<String>> {
 
 #[test]
 fn every_element_is_closed_and_every_id_unique() {
-    let html = full_page();
-    let xml = closed(&html);
-    let page = parse(&xml);
+    let page = full();
     assert_eq!(page.root_element().tag_name().name(), "html");
     let mut ids: Vec<_> = page.descendants().filter_map(|node| node.attribute("id")).collect();
     let links = page.descendants().filter_map(|node| node.attribute("href"));
@@ -181,9 +182,7 @@ fn the_page_needs_nothing_but_itself() {
 
 #[test]
 fn the_loss_budget_fills_its_bars_and_its_rows_add_up() {
-    let html = full_page();
-    let xml = closed(&html);
-    let page = parse(&xml);
+    let page = full();
     let bars: Vec<Node> = page.descendants().filter(|node| node.attribute("class") == Some("bar")).collect();
     assert_eq!(bars.len(), 2);
     for bar in bars {
@@ -196,9 +195,7 @@ fn the_loss_budget_fills_its_bars_and_its_rows_add_up() {
 
 #[test]
 fn the_simulated_machine_stands_beside_published_ones_and_is_marked() {
-    let html = full_page();
-    let xml = closed(&html);
-    let rows = cells(&parse(&xml), "This machine, simulated, and machines in fields");
+    let rows = cells(&full(), "This machine, simulated, and machines in fields");
     assert_eq!(rows[1][0], "this firmware, SIMULATED");
     assert_eq!(rows[1][3..6], ["2.5", "41.3 in the row, \u{2013} in the plot", "0.0 (below 3.1)"]);
     let jia = rows.iter().find(|row| row[0].starts_with("Jia")).unwrap();
@@ -213,8 +210,7 @@ fn the_page_is_the_same_each_time() {
 
 #[test]
 fn every_plot_is_in_the_table_with_its_measures() {
-    let xml = closed(&full_page());
-    let page = parse(&xml);
+    let page = full();
     let analysis = trial(true);
     let rows = cells(&page, "Each plot: counts, measurements and results");
     assert_eq!(rows.len(), 24);
@@ -252,8 +248,7 @@ fn every_plot_is_in_the_table_with_its_measures() {
 
 #[test]
 fn models_stand_beside_the_paper_s_figures() {
-    let xml = closed(&full_page());
-    let page = parse(&xml);
+    let page = full();
     let analysis = trial(true);
     let headings: Vec<String> = page.descendants().filter(|node| node.has_tag_name("h3")).map(text).collect();
     for of in &analysis.responses {
@@ -289,8 +284,7 @@ fn models_stand_beside_the_paper_s_figures() {
 
 #[test]
 fn controllers_are_compared_in_figures_and_in_a_table() {
-    let xml = closed(&full_page());
-    let page = parse(&xml);
+    let page = full();
     expect![[r#"
         [
             [
@@ -319,8 +313,7 @@ fn controllers_are_compared_in_figures_and_in_a_table() {
 
 #[test]
 fn zones_reached_stand_beside_damage_and_the_page_says_how_they_differ() {
-    let xml = closed(&full_page());
-    let page = parse(&xml);
+    let page = full();
     let rows = cells(&page, "Zones reached by each controller, %");
     assert_eq!(rows, [["1 km/h", "0.0", "21.4", "30.6", "93.5"], ["2.5 km/h", "1.2", "86.2", "97.7", "99.1"]]);
     let damage = cells(&page, "Plants damaged by each controller, %");
@@ -346,7 +339,7 @@ fn small_damage_does_not_read_as_0_and_no_count_reads_as_a_dash() {
     let mut records = trial(true).records;
     records.iter_mut().for_each(|plot| (plot.plants, plot.damaged) = (None, None));
     records[1..].iter_mut().for_each(|plot| plot.area_m2 = None);
-    let xml = closed(&plain_page("Not counted", &[], &Analysis::of(records).unwrap()));
+    let xml = closed(&plain_page("Not counted", &Analysis::of(records).unwrap()));
     let results = cells(&parse(&xml), "Result");
     assert_eq!(results[0], ["plants damaged", "\u{2013}", "counted in no plot"]);
     assert_eq!(results[2], ["ground", "20 m²", "in 1 plot"]);
@@ -354,8 +347,7 @@ fn small_damage_does_not_read_as_0_and_no_count_reads_as_a_dash() {
 
 #[test]
 fn the_bound_is_named_for_the_kept_margins() {
-    let xml = closed(&full_page());
-    let page = parse(&xml);
+    let page = full();
     let name = "most with every zone and margin kept";
     let names = |tag: &str| {
         page.descendants().filter(|node| node.has_tag_name(tag)).filter(|node| text(*node).trim() == name).count()
@@ -369,8 +361,7 @@ fn the_bound_is_named_for_the_kept_margins() {
 
 #[test]
 fn every_picture_has_a_description() {
-    let xml = closed(&full_page());
-    let page = parse(&xml);
+    let page = full();
     let pictures = page.descendants().filter(|node| node.tag_name().name() == "svg");
     let mut count = 0;
     for picture in pictures {
@@ -385,7 +376,7 @@ fn every_picture_has_a_description() {
 
 #[test]
 fn a_real_trial_is_evaluated_without_comparison_and_row() {
-    let html = plain_page("Our field", &[], &trial(true));
+    let html = plain_page("Our field", &trial(true));
     let xml = closed(&html);
     let page = parse(&xml);
     let headings: Vec<String> = page.descendants().filter(|node| node.has_tag_name("h2")).map(text).collect();
@@ -407,7 +398,7 @@ fn a_real_trial_is_evaluated_without_comparison_and_row() {
 fn a_measure_that_never_varies_has_no_model_and_the_page_says_why() {
     let analysis = trial(false);
     let why = analysis.responses[0].model.as_ref().unwrap_err().to_string();
-    let xml = closed(&plain_page("No damage", &[], &analysis));
+    let xml = closed(&plain_page("No damage", &analysis));
     let words = text(parse(&xml).root_element());
     assert!(words.contains(&why[1..]), "{why}");
     assert!(!words.contains("NaN") && !words.contains("inf "), "no figure is none");
@@ -417,7 +408,7 @@ fn a_measure_that_never_varies_has_no_model_and_the_page_says_why() {
 fn a_trial_of_one_plot_has_a_page() {
     let mut records = trial(true).records;
     records.truncate(1);
-    let html = plain_page("One plot", &[], &Analysis::of(records).unwrap());
+    let html = plain_page("One plot", &Analysis::of(records).unwrap());
     let xml = closed(&html);
     let page = parse(&xml);
     assert_eq!(cells(&page, "Each plot: counts, measurements and results").len(), 1);
@@ -430,7 +421,7 @@ fn a_mean_at_a_nominal_speed_below_the_measured_ones_stays_in_its_chart() {
     records.retain(|plot| plot.speed_km_h.fract() == 0.0);
     records.iter_mut().for_each(|plot| plot.speed_km_h *= 1.15);
     let analysis = Analysis::at_speeds(records, &[1.0, 2.0]).unwrap();
-    let xml = closed(&plain_page("Measured", &[], &analysis));
+    let xml = closed(&plain_page("Measured", &analysis));
     let page = parse(&xml);
     // Means are large circles, and plotters clamps what is outside the frame. A legend has one at 44.
     let xs =
@@ -444,17 +435,8 @@ fn words_from_outside_stay_words() {
     let hostile = "<script>alert('1 & 2')</script>\"";
     let parameters = [(hostile.to_owned(), hostile.to_owned())];
     let analysis = trial(true);
-    let page = Page {
-        title: hostile,
-        summary: vec![hostile.to_owned()],
-        paper: vec![hostile.to_owned()],
-        command: hostile,
-        parameters: &parameters,
-        analysis: &analysis,
-        log: None,
-        totals: &[],
-        row: None,
-    };
+    let [summary, paper] = [(); 2].map(|()| vec![hostile.to_owned()]);
+    let page = Page { summary, paper, command: hostile, parameters: &parameters, ..plain(hostile, &analysis) };
     let html = page.html().unwrap();
     assert!(!html.contains("<script"));
     let xml = closed(&html);
@@ -468,8 +450,7 @@ fn words_from_outside_stay_words() {
 
 #[test]
 fn every_colour_of_a_plot_has_another_on_dark_paper() {
-    let xml = closed(&full_page());
-    let page = parse(&xml);
+    let page = full();
     let style = page.descendants().find(|node| node.has_tag_name("style")).unwrap();
     let (_, dark) = style.text().unwrap().split_once("prefers-color-scheme: dark").unwrap();
     let plots = page.descendants().filter(|node| node.has_tag_name(("http://www.w3.org/2000/svg", "svg")));

@@ -27,7 +27,6 @@ const EFFICIENCY: [f64; 24] = [
     79.2, 82.6, 82.2, 80.9, 83.5,
 ];
 
-/// The plots' numbers.
 const NUMBERS: [u32; 24] = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24];
 
 /// The plots that are left where five were lost, numbered from 0.
@@ -64,7 +63,6 @@ fn assert_terms(model: &LinearModel, expected: [(&str, [f64; 4]); 3]) {
 /// Name, degrees of freedom and sum of squares of a source, and its F and p.
 type Expected = (&'static str, usize, f64, Option<(f64, f64)>);
 
-/// Asserts each source of an analysis.
 #[track_caller]
 fn assert_sources(analysis: &AnalysisOfVariance, expected: &[Expected]) {
     let names: Vec<&str> = analysis.sources.iter().map(|source| source.name).collect();
@@ -323,7 +321,6 @@ fn every_part_of_a_trial_gives_finite_figures() {
     assert!(modelled > 1000 && analysed > 800, "{modelled} {analysed}");
 }
 
-/// A design of plots at nominal speeds, each with its block.
 fn in_blocks(plots: impl IntoIterator<Item = ((f64, f64), u32)>) -> Design {
     Design::in_blocks(plots.into_iter().map(|((speed, spacing), block)| (speed, spacing, speed, block)))
 }

@@ -12,12 +12,10 @@ fn table(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/tables").join(name)
 }
 
-/// The plots of a table in this folder.
 fn plots(name: &str) -> Vec<PlotRecord> {
     read_csv(&table(name)).unwrap()
 }
 
-/// The manual's example.
 fn example() -> Vec<PlotRecord> {
     read_csv(&table("../../../../docs/trial-example.csv")).unwrap()
 }
@@ -32,7 +30,6 @@ fn assert_close(ours: f64, expected: f64) {
     assert!((ours / expected - 1.0).abs() <= 1e-9, "{ours} is not {expected}");
 }
 
-/// Asserts that a finding has these words.
 #[track_caller]
 fn assert_found(analysis: &Analysis, words: &str) {
     let findings = analysis.findings();

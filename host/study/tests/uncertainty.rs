@@ -232,13 +232,11 @@ fn overdispersed_plots_get_a_remark() {
     assert!(model.is_quasi && matches!(model.remarks.as_slice(), [Remark::Overdispersed { .. }]), "{model:?}");
 }
 
-/// A count of `of` with this share, by chance.
 fn binomial(chance: &mut ChaCha8Rng, of: u32, share: f64) -> u32 {
     (0..of).map(|_| u32::from(chance.random_bool(share))).sum()
 }
 
-/// 200 trials of the paper's design, in which neither speed nor spacing has an effect. In half of them, plots scatter by
-/// more than counting does.
+/// 200 trials without an effect of speed or spacing. In half of them, plots scatter by more than counting does.
 #[test]
 fn trials_without_an_effect_seldom_have_a_finding() {
     let mut chance = ChaCha8Rng::seed_from_u64(39);

@@ -17,22 +17,14 @@ const TIMEOUT_MS: u64 = 1000;
 
 /// Why a command had no good answer.
 #[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages say what each means")]
 pub enum ConsoleError {
-    /// The virtual Uno stopped.
     #[error(transparent)]
     Uno(#[from] UnoError),
-    /// The firmware refused.
     #[error(transparent)]
     Refused(#[from] Refused),
-    /// The firmware went silent.
     #[error("the firmware does not finish its answer to `{command}`: it sent {received:?}")]
-    Silent {
-        /// The command.
-        command: String,
-        /// The received text.
-        received: String,
-    },
-    /// The answer to `status` is none.
+    Silent { command: String, received: String },
     #[error("the firmware's status cannot be read: {0:?}")]
     Status(Vec<String>),
 }

@@ -61,8 +61,7 @@ const FOREIGN_SETTINGS: [&str; 9] = [
     "WEEDER_COMMIT",
 ];
 
-/// Uses these files in place of building them: the ELFs, their budgets, and the bootloader's `optiboot.hex`. A second
-/// call changes nothing.
+/// Uses these files in place of building them: the ELFs, their budgets, and `optiboot.hex`. Only the first call counts.
 pub fn put_inside(files: &'static [(&'static str, &'static [u8])]) {
     INSIDE.get_or_init(|| files);
 }

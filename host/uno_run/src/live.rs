@@ -98,8 +98,7 @@ const MOST_BYTES_ON_THEIR_WAY: usize = 64;
 /// Greatest number of unread bytes from the chip. Older bytes are lost.
 const MOST_BYTES_UNREAD: usize = 64 * 1024;
 
-/// Ground ahead of the row. It is longer than the distance from beam to tool, over which the tool waits before it
-/// begins.
+/// Ground ahead of the row: longer than the distance from beam to tool, over which the tool waits before it begins.
 const AHEAD_MM: f64 = 2500.0;
 
 /// Ground that the tool travels behind the row.
@@ -379,8 +378,7 @@ impl LiveUno {
                     run
                 }
             };
-            // All Unos that share the wheel use the same cycle, although their last instructions end at different
-            // cycles.
+            // All Unos that share the wheel use the same cycle, although their last instructions end at different ones.
             let motion = course.motion(run);
             self.uno.drive(course.machine.pin_changes(&course.row, &motion, self.sets_off));
             let end = cycle_at(self.sets_off, motion.duration_s());
@@ -404,7 +402,6 @@ fn terminal(link: Option<&Path>) -> Result<Pty> {
     Ok(pty)
 }
 
-/// The file with the EEPROM's content.
 struct EepromFile {
     path: PathBuf,
     /// Locked: two virtual Unos would overwrite what the other has saved.

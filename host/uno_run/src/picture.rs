@@ -128,8 +128,7 @@ fn colour(verdict: Verdict) -> &'static str {
     }
 }
 
-/// Marks for the verdicts, in addition to colours: one stroke for a cut margin, two for a reached zone, and a cross for a
-/// damaged plant.
+/// Marks for the verdicts: one stroke for a cut margin, two for a reached zone, and a cross for a damaged plant.
 fn strokes(x: f64, y: f64, reach: f64, verdict: Verdict) -> Path {
     let (left, right, top, bottom) = (tenth(x - reach), tenth(x + reach), tenth(y - reach), tenth(y + reach));
     let stroke = Data::new().move_to((left, bottom)).line_to((right, top));

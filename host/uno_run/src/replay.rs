@@ -90,7 +90,6 @@ pub fn replay(capture: &[PinChange], elf: &Path, mut progress: impl FnMut(f64)) 
     })
 }
 
-/// The first level of each pin, and the edges after that.
 fn split_first_levels(changes: &[PinChange]) -> (Vec<PinChange>, Vec<PinChange>) {
     let mut seen = Vec::new();
     changes.iter().partition(|change| {

@@ -20,14 +20,12 @@ use uno::{CYCLES_PER_SECOND, PinChange, Pulse, Uno, UnoError};
 
 /// Why a pass had no outcome.
 #[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages say what each means")]
 pub enum PassError {
-    /// The virtual Uno stopped.
     #[error(transparent)]
     Uno(#[from] UnoError),
-    /// The console gave an unexpected answer.
     #[error(transparent)]
     Console(#[from] ConsoleError),
-    /// The firmware restarted during the pass.
     #[error("the firmware restarted {} during the pass, so its position is invalid", counted(.0, "time"))]
     Restarted(usize),
 }

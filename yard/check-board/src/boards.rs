@@ -22,8 +22,7 @@ pub struct Boards {
 }
 
 impl Boards {
-    /// Opens both boards. A port without a name is one of `unos` where such a board answers: the tester by its
-    /// protocol, the weeder by its console.
+    /// Opens both boards. An unnamed port is one of `unos`: the tester by its protocol, the weeder by its console.
     ///
     /// # Errors
     /// If a named port cannot be opened or does not answer, or no other port has such a board.
@@ -52,12 +51,10 @@ impl Boards {
         self.tester.play(&plan.finish(), || self.weeder.drain())
     }
 
-    /// Cycles of the tester as milliseconds of the weeder.
     pub(crate) fn weeder_ms(&self, cycles: u64) -> f64 {
         cycles as f64 * 1000.0 / CYCLES_PER_SECOND as f64 * self.clock_ratio
     }
 
-    /// Whether a pulse takes the tool out.
     pub(crate) fn is_out(&self, pulse: &Pulse) -> bool {
         pulse.width_us() * self.clock_ratio > MIDDLE_US
     }

@@ -29,51 +29,38 @@ use thiserror::Error;
 
 /// Why a check could not go on.
 #[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages say what each means")]
 pub enum CheckError {
-    /// The weeder's console gave an unexpected answer.
     #[error("the weeder")]
     Weeder(#[from] LinkError),
-    /// The weeder's answer lacks a part.
     #[error("the weeder's answer to `{0}` is not understood: flash the firmware that belongs to this command")]
     Answer(&'static str),
-    /// The weeder's examples cannot be read or taught.
     #[error("the weeder's examples")]
     Examples(#[from] ExamplesError),
-    /// The user has interrupted the check.
     #[error("interrupted: the weeder has its saved settings and examples again")]
     Interrupted,
-    /// The tester's port cannot be opened.
     #[error("the tester")]
     TesterPort(#[source] LinkError),
-    /// No Uno is the board that is looked for.
     #[error(
         "no {0} answers at an Uno's port (looked at: {1}): connect and flash both boards, or name them by --port and --tester"
     )]
     NotFound(&'static str, String),
-    /// The tester does not answer.
     #[error(
         "the tester does not answer: flash it with the tester's firmware, and check that --port and --tester are not swapped"
     )]
     TesterSilent,
-    /// The tester's port is gone.
     #[error("the tester's port is gone")]
     TesterGone(#[source] io::Error),
-    /// The tester has another protocol.
     #[error("the tester has version {0} of the protocol, and this command has {PROTOCOL}: flash the tester again")]
     Protocol(u8),
-    /// The tester refused a command.
     #[error("the tester refused a command ({0:?}): this is a defect of the check")]
     Refused(Refusal),
-    /// Records of the tester are missing.
     #[error("{0} records of the tester are missing: use a shorter cable, or another USB port")]
     Missing(u32),
-    /// The plan did not reach the tester in time.
     #[error("the plan reached the tester too late: close other programs, or use another USB port")]
     Dry,
-    /// The servo's line has fallen silent.
     #[error("the servo's pulses have stopped: check the wire from D9 of the weeder to D8 of the tester")]
     NoPulses,
-    /// The row or machine cannot be made.
     #[error("the simulated row cannot be made: {0}")]
     Row(String),
 }

@@ -95,7 +95,6 @@ impl Figure {
         self
     }
 
-    /// The verdict against a simulated value.
     fn verdict(&self, simulated: Option<f64>) -> Verdict {
         let is_within = |measured: &f64| {
             self.lowest.is_none_or(|lowest| *measured >= lowest)

@@ -14,12 +14,10 @@ use link::examples::{self, Taught};
 use link::{Mode, settings};
 use tester_core::message::Command;
 
-/// The weeder's rate when it is reset at work: 1.9 km/h with the factory settings' wheel, for as many counts as fit
-/// into the tester.
+/// The rate when the weeder is reset at work: 1.9 km/h with the factory settings' wheel, for as many counts as fit.
 const ROLL_COUNTS_PER_S: f64 = 1000.0;
 const ROLL_COUNTS: i32 = 8000;
 
-/// Time for which the reset is pulled, in ms.
 const PULLED_MS: u32 = 20;
 
 /// Time limit of the firmware's start after its bootloader, in ms.
@@ -31,14 +29,12 @@ const SIMULATED_START_MS: u32 = 500;
 /// At the end of this time, pulses must have come for this long, in ms: five frames.
 const AGAIN_MS: u32 = 100;
 
-/// The resets come within this time of the command, in ms. A byte takes 3.4 ms, and in simulation a changed number is
-/// there after 50 ms.
+/// The resets come within this time of the command, in ms. A byte takes 3.4 ms, a changed number in simulation 50 ms.
 const SAVE_MS: u32 = 120;
 
 /// The longest time of a save of all settings, in ms.
 const SAVED_MS: u32 = 1000;
 
-/// The setting that is changed.
 const SETTING: &str = "max_width_mm";
 
 /// How the weeder is reset.
@@ -191,7 +187,6 @@ impl Boards {
         Ok(saves)
     }
 
-    /// The setting's value.
     fn setting(&mut self) -> Result<u32, CheckError> {
         let lines = self.weeder.ask(&format!("get {SETTING}"))?;
         let (_, value) = lines.iter().find_map(|line| settings::shown(line)).ok_or(CheckError::Answer("get"))?;

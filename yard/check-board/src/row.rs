@@ -16,7 +16,6 @@ use uno::{CYCLES_PER_SECOND, Pulse};
 /// The machine on the boards: guided, and set up.
 const FIELD: &str = "straight";
 
-/// The seed of row and machine.
 const SEED: u64 = 1;
 
 /// From the plan's start to the motion's, in ms: some pulses come before.

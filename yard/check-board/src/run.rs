@@ -26,7 +26,6 @@ impl Extent {
         if self.brief { (3, 1, &[2.5]) } else { (20, 5, &[1.0, 2.5, 4.0]) }
     }
 
-    /// Time for which pulses are recorded, in ms.
     fn pulses_ms(self) -> u32 {
         if self.brief { 400 } else { 10_000 }
     }
@@ -97,7 +96,6 @@ const PROVED_PER_S: f64 = (CYCLES_PER_SECOND / PROVED_CYCLES as u64) as f64;
 /// With jitter of 30 %, two counts take at least 1.4 times the mean. This number of cycles keeps to the proof.
 const JITTERED_CYCLES: u32 = 79;
 
-/// The bursts' figures.
 fn rates(boards: &mut Boards, extent: Extent) -> Result<Vec<Figure>, CheckError> {
     let mut figures = Vec::new();
     let all = [(true, true), (true, false), (false, true), (false, false)];
@@ -132,7 +130,6 @@ const RATE_TOLERANCE: f64 = 40_000.0;
 /// Tolerance of times: a servo's frame and some turns of the loop, in ms.
 const TIME_TOLERANCE_MS: f64 = 25.0;
 
-/// A time in ms.
 fn time(id: impl Into<String>, what: impl Into<String>, value_ms: f64) -> Figure {
     Figure::new(id, what, "ms", value_ms, TIME_TOLERANCE_MS)
 }
@@ -172,7 +169,6 @@ fn alarms(boards: &mut Boards, extent: Extent) -> Result<Vec<Figure>, CheckError
 /// Longest time without a pulse, in ms, and its tolerance: a bootloader takes up to 2 s, and a virtual Uno has none.
 const RESET_MS: f64 = 2500.0;
 
-/// The resets' figures.
 fn resets(boards: &mut Boards, extent: Extent) -> Result<Vec<Figure>, CheckError> {
     let before = Kept::read(boards)?;
     let mut figures = Vec::new();
@@ -206,7 +202,6 @@ fn resets(boards: &mut Boards, extent: Extent) -> Result<Vec<Figure>, CheckError
 /// same firmware had means from 9.1 to 13.0.
 const SWING_TOLERANCES: [f64; 2] = [6.0, 80.0];
 
-/// A row's figures.
 fn of_row(outcome: &Outcome, plants: usize, weeds: usize, speed: f64) -> Vec<Figure> {
     let Outcome { judgement, lost_counts } = outcome;
     let errors = || judgement.swing_errors_ticks().into_iter().map(f64::abs);

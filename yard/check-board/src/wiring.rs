@@ -92,13 +92,11 @@ impl Weeder {
     }
 }
 
-/// The wire of a line.
 fn wire(line: Line) -> &'static Wire {
     // The first wires are in the order of the lines' bits.
     &WIRES[line.bit().trailing_zeros() as usize]
 }
 
-/// The advice to check the wire of a line.
 fn check_wire(line: Line) -> String {
     let Wire { tester, weeder, .. } = wire(line);
     format!("check the wire from {tester} to {weeder}")

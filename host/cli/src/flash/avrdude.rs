@@ -23,7 +23,6 @@ const SILENCE: Duration = Duration::from_secs(12);
 /// Time that avrdude has to end by itself once its port is gone.
 const GRACE: Duration = Duration::from_secs(2);
 
-/// Time between two looks at the port.
 const LOOK: Duration = Duration::from_millis(100);
 
 const GET_IT: &str = if cfg!(windows) {
@@ -111,7 +110,6 @@ pub fn write(flash: &[u8], port: &str, baud: u32) -> Result<(bool, Option<Signat
     Ok((succeeded, reader.join().ok().flatten()))
 }
 
-/// How avrdude's messages begin.
 const MESSAGE: &[u8] = b"avrdude";
 
 /// Passes on avrdude's messages, each once over all tries, and its progress at once, until the input ends. Reports each

@@ -8,7 +8,6 @@ use link::Claim;
 use std::io::{ErrorKind, Read, Write};
 use std::time::{Duration, Instant};
 
-/// The signature of a chip.
 pub type Signature = [u8; 3];
 
 /// That of the Uno's chip.
@@ -42,7 +41,6 @@ const CALLS: usize = 12;
 /// What answers at a port.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Heard {
-    /// A bootloader, on a chip with this signature.
     Bootloader(Signature),
     /// Another program or device, that sends text.
     Text(String),

@@ -8,13 +8,11 @@ use link::completion::{common, complete};
 use link::row_names::NAME_LENGTH;
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 
-/// Lines remembered.
 const HISTORY: usize = 100;
 
 /// A line that is being typed. A row's name in it may have characters of any language.
 #[derive(Clone, Debug, Default)]
 pub struct CommandLine {
-    /// The characters typed.
     pub text: String,
     /// Number of bytes before the cursor, which stands between two characters.
     pub cursor: usize,
@@ -26,7 +24,6 @@ pub struct CommandLine {
 }
 
 impl CommandLine {
-    /// Clears the line.
     pub fn clear(&mut self) {
         self.show(None, String::new());
         self.candidates.clear();

@@ -20,7 +20,6 @@ const LINES: usize = 500;
 /// Time after a status in which it counts as the present one.
 const FRESH: Duration = Duration::from_secs(1);
 
-/// Whether the Uno is there.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Connection {
     /// With a firmware of this version.
@@ -35,12 +34,9 @@ impl Default for Connection {
     }
 }
 
-/// An object that the beam has seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Seen {
-    /// Its class.
     pub class: Class,
-    /// Votes for that.
     pub votes: u8,
     /// The position where the beam broke, in ticks.
     pub leading: i32,
@@ -53,21 +49,16 @@ pub struct Seen {
 /// The state of the last command to a row.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Answer {
-    /// There was none.
     #[default]
     None,
-    /// It has no answer yet.
     Waiting,
-    /// The machine has executed it.
     Done,
     /// The machine has refused it, or it was not typed.
     Refused,
 }
 
-/// The state of a row.
 #[derive(Clone, Debug, Default)]
 pub struct RowModel {
-    /// The operator's name for it.
     pub name: String,
     pub connection: Connection,
     /// The last status that was understood.
@@ -83,7 +74,6 @@ pub struct RowModel {
     pub zones: VecDeque<Seen>,
     /// Advice for the operator in an alarm.
     advice: Option<String>,
-    /// The present warning of the machine.
     warned: Option<Warning>,
     /// The message of a restart at work, until the machine works again.
     pub restarted: Option<String>,
@@ -96,7 +86,6 @@ pub struct RowModel {
     warning: Option<String>,
 }
 
-/// The state of the machine.
 #[derive(Clone, Debug, Default)]
 pub struct Model {
     /// Its rows, at least one.
@@ -109,7 +98,6 @@ pub struct Model {
     pub lines: VecDeque<String>,
     pub pager: Pager,
     pub line: CommandLine,
-    /// Whether to ring the bell.
     rings: bool,
 }
 
@@ -166,13 +154,11 @@ impl Model {
         }
     }
 
-    /// Records a HOLD to all.
     pub fn held(&mut self, hold: Hold) {
         self.sent(None, "hold");
         self.hold = Some(hold);
     }
 
-    /// Takes an event of a row.
     pub fn take(&mut self, heard: Heard) {
         if let Some(hold) = &mut self.hold {
             hold.take(&heard);
@@ -186,7 +172,6 @@ impl Model {
         }
     }
 
-    /// Updates a row by an event.
     pub fn update(&mut self, number: usize, happening: Happening) {
         use EventLine::{Alarm, Newer, Plot, State, Warning};
         // Plants and swings of several rows are too many lines to read.
@@ -226,7 +211,6 @@ impl Model {
         said.iter().for_each(|line| self.say_of(number, line));
     }
 
-    /// Adds a line to the console.
     pub fn say(&mut self, line: String) {
         if self.lines.len() == LINES {
             self.lines.pop_front();

@@ -4,7 +4,6 @@
 
 use std::cell::Cell;
 
-/// The part of the output that is shown.
 #[derive(Clone, Debug, Default)]
 pub struct Pager {
     /// Lines up to the last shown one. `None` follows the newest.

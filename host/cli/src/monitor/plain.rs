@@ -28,7 +28,6 @@ use std::time::{Duration, Instant};
 /// Lines that are read ahead. The others wait in the pipe.
 const READ_AHEAD: usize = 64;
 
-/// Time between two checks of the input.
 const LOOK: Duration = Duration::from_millis(20);
 
 /// Time without a line of an awaited answer after which a `hold` goes first.
@@ -76,7 +75,6 @@ struct Talk<'a> {
     unsent: Vec<String>,
     /// Whether the last line named a row only. A shell may split `left: start`, and `start` is not for all.
     is_split: bool,
-    /// The lines to print.
     lines: Sender<Printed>,
     finding: Finding,
 }
@@ -143,7 +141,6 @@ impl<'a> Talk<'a> {
         self.standing.iter().all(|row| row.is_there.is_some() && row.unanswered.is_empty())
     }
 
-    /// The finding of the whole session.
     fn end(&self) -> Result<Finding> {
         let failed = self.chosen.rows.iter().zip(&self.standing).filter(|(_, standing)| standing.has_failed);
         let failed: Vec<&str> = failed.map(|(row, _)| row.name.as_str()).collect();
@@ -173,7 +170,6 @@ impl<'a> Talk<'a> {
         self.unsent.push(line.number.to_string());
     }
 
-    /// Has a line printed.
     fn print(&self, line: String) {
         // The thread that prints is gone only after a panic, which the end reports.
         let _ = self.lines.send(Printed::Result(line));

@@ -156,7 +156,6 @@ mod tests {
     use link::settings::Settings;
     use link::{EventLine, LinkError};
 
-    /// Rows that are not there.
     fn absent<const COUNT: usize>(names: [&str; COUNT]) -> (Rows, Model) {
         let opener = |_| -> Opener { Box::new(|| Err(LinkError::Absent("it".to_owned()))) };
         let (rows, _) = Rows::open(names.map(opener).into());

@@ -16,7 +16,6 @@ use ratatui::style::{Color, Modifier, Style, Stylize};
 use ratatui::text::Line;
 use ratatui::widgets::{Block, Paragraph};
 
-/// Draws all of it.
 pub fn draw(model: &Model, frame: &mut Frame) {
     match model.rows.as_slice() {
         [row] => one::draw(model, row, frame),
@@ -61,8 +60,7 @@ enum Ground {
     Canopy,
 }
 
-/// The column of a position ahead of the tool, out of `columns`. A quarter of the distance from beam to tool is shown
-/// behind the tool.
+/// The column, out of `columns`, of a position ahead of the tool. A fifth of them is behind the tool.
 fn column_of(row: &RowModel, columns: usize, ahead_of_tool_mm: f64) -> f64 {
     let beam_to_tool = f64::from(row.settings.get(Setting::BeamToToolMm));
     let mm_per_column = 1.25 * beam_to_tool / columns.max(1) as f64;
@@ -120,8 +118,7 @@ fn draw_said(model: &Model, frame: &mut Frame, area: Rect) {
     frame.render_widget(shown_lines(model, block.inner(area)).block(block), area);
 }
 
-/// The line that is being typed and its addressee. Below it is the result of HOLD, the completions, or the list of
-/// keys.
+/// The line that is being typed and its addressee. Below it: the result of HOLD, the completions, or the keys.
 fn draw_line(model: &Model, to: &str, frame: &mut Frame, area: Rect, hint: Rect) {
     let prompt = format!("{to}> ");
     let before = Line::raw(format!("{prompt}{}", &model.line.text[..model.line.cursor]));

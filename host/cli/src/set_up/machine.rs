@@ -70,7 +70,6 @@ impl Guide {
         }
     }
 
-    /// Asks for a measure of the machine.
     fn measure(&mut self, name: &str, question: &str) -> Result<()> {
         let Some(input) = input(&Machine::default(), name) else { return Ok(()) };
         let before = self.state.asked.get(name).map(f64::to_string);

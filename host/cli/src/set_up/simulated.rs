@@ -18,7 +18,6 @@ use uno_run::report::number_table;
 /// Plots of each spacing.
 const REPLICATIONS: u32 = 10;
 
-/// Selects the random fields and measurements.
 const SEED: u64 = 1;
 
 /// The greatest speed, and the greatest share of the board's top speed. The driver's speed wanders by 8 %, and a wheel
@@ -29,7 +28,6 @@ const TOP_SPEED_SHARE: f64 = 0.75;
 /// The least time for 45 degrees that the field takes.
 const LEAST_TRAVEL_MS: f64 = 10.0;
 
-/// The field, seed and speed.
 pub fn about() -> String {
     format!(
         "Field {}, seed {SEED}, {SPEED_KM_H} km/h, {REPLICATIONS} replications at 50 and 60 cm.",
@@ -64,7 +62,6 @@ pub fn table() -> Result<Table> {
     Ok(table)
 }
 
-/// The field's rows, weeded.
 fn weeded(conditions: &Conditions, speed_km_h: f64) -> Result<Vec<Total>> {
     let experiment = Experiment {
         speeds_km_h: vec![speed_km_h],

@@ -7,7 +7,6 @@ use study::evaluation::{Analysis, published};
 use study::experiment::{self, ControllerKind, Experiment, PlotOutcome, Total};
 use study::statistics::Share;
 
-/// The result in words.
 pub(super) fn summary(experiment: &Experiment, totals: &[Total]) -> Vec<String> {
     let mut sentences: Vec<String> =
         experiment.controllers.iter().map(|&controller| damage(totals, controller)).collect();

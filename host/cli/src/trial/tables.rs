@@ -18,9 +18,7 @@ type Column = (&'static str, fn(&Total) -> String, &'static [Contents]);
 pub(super) enum Contents {
     /// The most important columns, for `--brief`.
     Brief,
-    /// The results for plants.
     Plants,
-    /// The weeded ground.
     Ground,
 }
 
@@ -62,7 +60,6 @@ pub(super) fn by_speed(totals: &[Total], contents: Contents) -> Table {
     table
 }
 
-/// The heading of the loss budget.
 pub(super) const LOSS_BUDGET: &str = "Loss budget of the row's ground with this firmware, %";
 
 /// The firmware's loss budget, a line a speed: each adds up to 100 %.
@@ -95,7 +92,6 @@ fn gone(weeds: WeedCount) -> String {
     optional(weeds.efficiency_percent(), |percent| format!("{percent:.1}"))
 }
 
-/// A share and its interval.
 fn interval(share: Share) -> String {
     if share.of == 0 { share.shown() } else { format!("{} ({share})", share.shown()) }
 }

@@ -2,20 +2,17 @@
 //!
 //! Tests begin in the order of their names. This one takes longest, and mostly waits, so it has to begin first.
 
-use crate::common::said;
+use crate::common::{assert_has, folder_with, said};
 use crate::set_up::{SEED, lead, machine_of_the_page, type_to, uno, weeded};
 use field::conditions::Conditions;
 use link::settings::{Setting, name};
-use std::fs;
 use std::process::ChildStdin;
 use std::thread;
 use std::time::Duration;
-use tempfile::TempDir;
 
 #[test]
 fn a_person_sets_the_virtual_uno_up_from_the_first_question_to_the_last() {
-    let folder = TempDir::new().expect("there is room for a folder");
-    fs::write(folder.path().join("my.toml"), machine_of_the_page()).expect("there is room for a file");
+    let folder = folder_with("my.toml", &machine_of_the_page());
     // Fast, for a test.
     let (_uno, mut machine) = uno(folder.path(), &["--roll", "--link", "uno", "--speed", "5"]);
     let words = ["--port", "./uno", "--machine", "my.toml"];
@@ -59,16 +56,15 @@ fn a_person_sets_the_virtual_uno_up_from_the_first_question_to_the_last() {
     assert!(first.ends_with("Stopped. The same command continues here.\n"), "{first}");
     let second = lead(folder.path(), &words, &mut act);
     assert!(disturbed && timings == 3, "{timings} timings: {second}");
-    for words in [
+    let parts = [
         "Step 4 of 8, Fit a second beam: done",
         "servo_out_us in us, now 2000 [1750]",
         "The measurements ask for ",
         " + blade 10 + ",
         "    stem_zone_mm 110 mm\n",
         "Next, read docs/work.md",
-    ] {
-        assert!(second.contains(words), "{words:?} is not in\n{second}");
-    }
+    ];
+    assert_has(&second, parts);
     assert!(!second.contains("Open: ") && !second.contains("Warning"), "{second}");
     // The summary expects what the field `walked` weeds.
     let expected = second.split("Expected: ").nth(1).and_then(|rest| rest.split(' ').next()).expect("it is printed");

@@ -182,17 +182,11 @@ const MARKS: [&str; 16] =
 /// A random change of a file.
 #[derive(Clone, Debug)]
 enum Mishap {
-    /// It ends early.
     Cut(prop::sample::Index),
-    /// Bytes are others.
     Bytes(prop::sample::Index, Vec<u8>),
-    /// A number is another.
     Number(prop::sample::Index, prop::sample::Index),
-    /// Inserts a mark.
     Mark(prop::sample::Index, prop::sample::Index),
-    /// Repeats a part.
     Repeat(prop::sample::Index, usize, usize),
-    /// A part is gone.
     Gone(prop::sample::Index, usize),
 }
 

@@ -1,28 +1,42 @@
 //! The errors of the `weeder` command for wrong input. None of these tests runs the firmware.
 
-use crate::common::{self, weeder};
+use crate::common::{self, assert_has, command, folder_with, told, weeder};
 use std::fs;
 use std::path::Path;
-#[cfg(unix)]
-use std::process::Command;
 
-/// Asserts that these arguments are refused with a message that contains `words`.
 #[track_caller]
-fn assert_refused(arguments: &[&str], words: &str) {
-    common::assert_refused(Path::new("."), arguments, words);
+fn assert_refused(words: &str, why: &str) {
+    common::assert_refused(Path::new("."), &words.split(' ').collect::<Vec<_>>(), why);
 }
 
 #[test]
-fn a_speed_that_no_machine_walks_is_refused_with_its_range() {
-    assert_refused(&["sim", "--speed", "11"], "it has to be a number from 0.1 to 10");
-    assert_refused(&["sim", "--speed", "fast"], "it has to be a number from 0.1 to 10");
-    assert_refused(&["sim", "--speed", "NaN"], "it has to be a number from 0.1 to 10");
+fn wrong_arguments_are_refused_with_what_would_be_right() {
+    const SPEED: &str = "it has to be a number from 0.1 to 10";
+    for (words, why) in [
+        ("sim --speed 11", SPEED),
+        ("sim --speed fast", SPEED),
+        ("sim --speed NaN", SPEED),
+        ("sim --speed -1", SPEED),
+        ("sim --plants -1", "it has to be a whole number from 1 to 1000"),
+        ("sim --seed -1", "it has to be a whole number from 0 to 18446744073709551615"),
+        ("trial --speeds -1,2", "it has to be a number from 0.1 to 8"),
+        ("soak --hours -5", "it has to be a whole number from 0 to 10000"),
+        ("soak --hours 0 --uno-minutes 0", "one of them has to be above 0"),
+        ("sim --elf no.elf --beam-to-tool 1500", "The simulated machine has one beam."),
+        ("sim --spacing 100 --canopy 150", "--spacing has to exceed --canopy"),
+        ("sim --plants 2 --weeds 50", "there is no room for 50 tall weeds between the plants"),
+        ("sim --row no-such-row.csv", "no-such-row.csv"),
+        ("sim --capture no-such.vcd --channel-a A --channel-b B", "no-such.vcd"),
+        ("sim --capture some.vcd", "--channel-a"),
+        ("flash --port /dev/no-such-port", "/dev/no-such-port"),
+    ] {
+        assert_refused(words, why);
+    }
 }
 
 #[test]
 fn each_weeding_command_warns_of_straying_into_the_sweeps() {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("field.toml"), "[driving]\nsteering_mm = 15\n[plot]\nrow_m = 2\n").unwrap();
+    let folder = folder_with("field.toml", "[driving]\nsteering_mm = 15\n[plot]\nrow_m = 2\n");
     for command in [
         "sim --elf no.elf",
         "trial --replications 1 --speeds 1 --brief",
@@ -31,7 +45,7 @@ fn each_weeding_command_warns_of_straying_into_the_sweeps() {
     ] {
         for (field, warns) in [("field.toml", true), ("from-the-box", false)] {
             let words: Vec<&str> = command.split(' ').chain(["--field", field]).collect();
-            let message = String::from_utf8_lossy(&weeder(folder.path(), &words).stderr).into_owned();
+            let message = told(&weeder(folder.path(), &words));
             let warning = "driving.steering_mm is 15, but the sweeps leave 0.0 mm";
             assert_eq!(message.contains(warning), warns, "{command}: {message}");
             assert!(!warns || message.contains("Set machine.sweep_from_mm to 65 or more."), "{command}: {message}");
@@ -43,72 +57,20 @@ fn each_weeding_command_warns_of_straying_into_the_sweeps() {
         "sensitivity --replications 1 --speeds 1 crop.canopy_mm=160 driving.steering_mm=20",
     ] {
         let words: Vec<&str> = command.split(' ').chain(["--field", "from-the-box"]).collect();
-        let message = String::from_utf8_lossy(&weeder(folder.path(), &words).stderr).into_owned();
-        assert!(message.contains("driving.steering_mm is 20, but the sweeps leave 0.0 mm"), "{command}: {message}");
+        let message = told(&weeder(folder.path(), &words));
+        assert_has(&message, ["driving.steering_mm is 20, but the sweeps leave 0.0 mm"]);
     }
-}
-
-#[test]
-fn a_field_s_second_beam_that_the_distance_removes_is_named() {
-    assert_refused(&["sim", "--elf", "no.elf", "--beam-to-tool", "1500"], "The simulated machine has one beam.");
 }
 
 #[test]
 fn a_distance_other_than_the_setting_gets_a_warning() {
-    let folder = tempfile::tempdir().unwrap();
     let field = "[machine]\nbeam_to_tool_mm = 500\n[settings]\nbeam_to_tool_mm = 600\n";
-    fs::write(folder.path().join("field.toml"), field).unwrap();
+    let folder = folder_with("field.toml", field);
     for (distance, warning) in [("600", ""), ("700", "is 600, but the simulated machine has 700.")] {
         let words = ["sim", "--elf", "no.elf", "--field", "field.toml", "--beam-to-tool", distance];
-        let message = String::from_utf8_lossy(&weeder(folder.path(), &words).stderr).into_owned();
+        let message = told(&weeder(folder.path(), &words));
         assert!(message.contains(warning) && message.contains("Warning") != warning.is_empty(), "{message}");
     }
-}
-
-#[test]
-fn canopies_wider_than_their_spacing_are_refused() {
-    assert_refused(&["sim", "--spacing", "100", "--canopy", "150"], "--spacing has to exceed --canopy");
-}
-
-#[test]
-fn more_weeds_than_there_is_room_for_are_refused() {
-    assert_refused(&["sim", "--plants", "2", "--weeds", "50"], "there is no room for 50 tall weeds between the plants");
-}
-
-#[test]
-fn a_row_and_a_recording_that_do_not_exist_are_named() {
-    assert_refused(&["sim", "--row", "no-such-row.csv"], "no-such-row.csv");
-    let recording = ["sim", "--capture", "no-such.vcd", "--channel-a", "A", "--channel-b", "B"];
-    assert_refused(&recording, "no-such.vcd");
-}
-
-#[test]
-fn a_recording_without_its_channels_is_refused() {
-    assert_refused(&["sim", "--capture", "some.vcd"], "--channel-a");
-}
-
-#[test]
-fn a_negative_number_is_refused_with_its_range() {
-    assert_refused(&["sim", "--speed", "-1"], "it has to be a number from 0.1 to 10");
-    assert_refused(&["sim", "--plants", "-1"], "it has to be a whole number from 1 to 1000");
-    assert_refused(&["sim", "--seed", "-1"], "it has to be a whole number from 0 to 18446744073709551615");
-    assert_refused(&["trial", "--speeds", "-1,2"], "it has to be a number from 0.1 to 8");
-    assert_refused(&["soak", "--hours", "-5"], "it has to be a whole number from 0 to 10000");
-}
-
-#[test]
-fn a_row_that_no_machine_can_roll_along_is_refused_with_its_line() {
-    let folder = tempfile::tempdir().unwrap();
-    let row = folder.path().join("row.csv");
-    for position in ["4294967296", "18446744073709551616", "-1e300", "nan"] {
-        std::fs::write(&row, format!("position_mm,width_mm,kind\n500,150,plant\n{position},150,plant\n")).unwrap();
-        assert_refused(&["sim", "--row", row.to_str().unwrap()], "row.csv, line 3: position_mm is ");
-    }
-    std::fs::write(&row, "position_mm,width_mm,kind\n-9e6,150,plant\n9e6,150,plant\n").unwrap();
-    assert_refused(
-        &["sim", "--row", row.to_str().unwrap()],
-        "line 3: the row is 36000 m long, with half a spacing at its ends: it has to be at most 6000 m",
-    );
 }
 
 /// `FILE` stands for the file in arguments.
@@ -155,33 +117,26 @@ fn a_file_whose_name_is_no_text_is_read() {
     let name = OsStr::from_bytes(b"M\xE4rz.csv");
     let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/trial-example.csv");
     fs::copy(example, folder.path().join(name)).unwrap();
-    let mut evaluate = Command::new(env!("CARGO_BIN_EXE_weeder"));
-    let output = evaluate.current_dir(folder.path()).arg("evaluate").arg(name).output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let mut trial = Command::new(env!("CARGO_BIN_EXE_weeder"));
-    let output = trial.args(["trial", "--field"]).arg(name).output().unwrap();
-    assert!(String::from_utf8_lossy(&output.stderr).contains("is no UTF-8: rename the file"));
-}
-
-#[test]
-fn a_soak_of_nothing_is_refused() {
-    assert_refused(&["soak", "--hours", "0", "--uno-minutes", "0"], "one of them has to be above 0");
+    let output = command(&["evaluate"]).current_dir(folder.path()).arg(name).output().unwrap();
+    assert!(output.status.success(), "{}", told(&output));
+    let output = command(&["trial", "--field"]).arg(name).output().unwrap();
+    assert_has(&told(&output), ["is no UTF-8: rename the file"]);
 }
 
 #[test]
 fn no_cause_is_printed_twice() {
-    for arguments in [
-        &["virtual-uno", "--bootloader", "no-such.hex"][..],
-        &["virtual-uno", "--stand", "--bootloader", "optiboot", "--eeprom", "no-such/uno.eeprom"],
-        &["virtual-uno", "--stand", "--bootloader", "optiboot", "--link", "no-such/uno"],
-        &["hex", "weeder.hex", "--elf", "no-such.elf"],
-        &["replay", "no-such.csv"],
-        &["settings", "diff", "no-such.toml"],
-        &["examples", "push", "no-such.csv"],
-        &["design", "--machine", "no-such.toml"],
+    for words in [
+        "virtual-uno --bootloader no-such.hex",
+        "virtual-uno --stand --bootloader optiboot --eeprom no-such/uno.eeprom",
+        "virtual-uno --stand --bootloader optiboot --link no-such/uno",
+        "hex weeder.hex --elf no-such.elf",
+        "replay no-such.csv",
+        "settings diff no-such.toml",
+        "examples push no-such.csv",
+        "design --machine no-such.toml",
     ] {
-        let message = String::from_utf8_lossy(&weeder(Path::new("."), arguments).stderr).into_owned();
-        assert_eq!(message.matches("No such file or directory").count(), 1, "{arguments:?}: {message}");
+        let message = told(&weeder(Path::new("."), &words.split(' ').collect::<Vec<_>>()));
+        assert_eq!(message.matches("No such file or directory").count(), 1, "{words}: {message}");
     }
 }
 
@@ -213,10 +168,9 @@ fn no_message_in_the_source_repeats_its_cause() {
 
 #[test]
 fn a_file_s_text_cannot_control_the_terminal() {
-    let folder = tempfile::tempdir().unwrap();
     let wires = "$timescale 1 us $end\n$var wire 1 ! A\u{1b}[2J $end\n$enddefinitions $end\n#0 0!\n";
+    let folder = folder_with("logic.vcd", wires);
     let log = "time_ms,kind,line\n0,connected,0.2.0\n0,setting,k\u{1b}[2J=3\n";
-    fs::write(folder.path().join("logic.vcd"), wires).unwrap();
     fs::write(folder.path().join("log.csv"), log).unwrap();
     for (arguments, quoted) in [
         (&["sim", "--capture", "logic.vcd", "--channel-a", "A", "--channel-b", "B"][..], r"`A\u{1b}[2J`"),
@@ -226,9 +180,4 @@ fn a_file_s_text_cannot_control_the_terminal() {
         let message = weeder(folder.path(), arguments).stderr;
         assert!(!message.contains(&0x1B), "{}", String::from_utf8_lossy(&message));
     }
-}
-
-#[test]
-fn a_port_that_does_not_exist_is_named() {
-    assert_refused(&["flash", "--port", "/dev/no-such-port"], "/dev/no-such-port");
 }

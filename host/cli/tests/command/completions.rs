@@ -1,28 +1,28 @@
 //! `weeder completions` in real shells.
 
-use std::fs;
+use crate::common::{assert_has, assert_refused, folder_with, said};
+use std::path::Path;
 use std::process::Command;
 
-/// The output of `weeder completions` for a shell.
-fn completions(shell: &str) -> String {
-    let output = Command::new(env!("CARGO_BIN_EXE_weeder")).args(["completions", shell]).output();
-    let output = output.expect("cargo has built the command");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).expect("it is text")
+fn completions(word: &str) -> String {
+    said(Path::new("."), &["completions", word])
 }
 
 /// The words that Tab offers in bash after these words. The last word is incomplete.
 fn offered_by_bash(words: &[&str]) -> Vec<String> {
-    let folder = tempfile::tempdir().expect("there is room for a file");
-    let file = folder.path().join("weeder");
-    fs::write(&file, completions("bash")).expect("it can be written");
+    let folder = folder_with("weeder", &completions("bash"));
     // The call of bash itself: the command, the incomplete word, and the word before it.
     let script = r#"source "$1"; shift
         COMP_WORDS=("$@") COMP_CWORD=$(($# - 1))
         _weeder "$1" "${@: -1}" "${@: -2:1}"
         printf '%s\n' "${COMPREPLY[@]}""#;
     let mut bash = Command::new("bash");
-    let output = bash.args(["--norc", "-c", script, "bash"]).arg(&file).args(words).output().expect("bash is there");
+    let output = bash
+        .args(["--norc", "-c", script, "bash"])
+        .arg(folder.path().join("weeder"))
+        .args(words)
+        .output()
+        .expect("bash is there");
     assert!(output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).expect("it is text").lines().map(str::to_owned).collect()
 }
@@ -49,27 +49,20 @@ fn bash_completes_presets_crops_and_axes() {
 #[test]
 fn other_shells_complete_every_command() {
     for shell in ["elvish", "fish", "powershell", "zsh"] {
-        let script = completions(shell);
-        for command in ["virtual-uno", "monitor", "old-bootloader"] {
-            assert!(script.contains(command), "{shell} is not told of {command}");
-        }
+        assert_has(&completions(shell), ["virtual-uno", "monitor", "old-bootloader"]);
     }
 }
 
 #[test]
 fn the_help_has_a_line_for_each_shell_that_the_manual_names() {
-    let output = Command::new(env!("CARGO_BIN_EXE_weeder")).args(["completions", "--help"]).output();
-    let help = String::from_utf8(output.expect("cargo has built the command").stdout).expect("it is text");
+    let help = completions("--help");
     for shell in ["bash", "zsh", "fish", "powershell"] {
-        assert!(help.contains(&format!("weeder completions {shell}")), "{shell} is not in {help}");
+        assert_has(&help, [&*format!("weeder completions {shell}")]);
     }
 }
 
 #[test]
 fn a_shell_that_is_not_known_is_refused_with_those_that_are() {
-    let output = Command::new(env!("CARGO_BIN_EXE_weeder")).args(["completions", "tcsh"]).output();
-    let output = output.expect("cargo has built the command");
-    assert_eq!(output.status.code(), Some(2));
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert!(message.contains("[possible values: bash, elvish, fish, powershell, zsh]"), "{message}");
+    let known = "[possible values: bash, elvish, fish, powershell, zsh]";
+    assert_refused(Path::new("."), &["completions", "tcsh"], known);
 }

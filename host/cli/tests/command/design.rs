@@ -1,6 +1,6 @@
 //! `weeder design` as a user runs it.
 
-use crate::common::{assert_refused, said};
+use crate::common::{self, assert_has, assert_refused, said};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -9,23 +9,13 @@ use tempfile::TempDir;
 /// The page of the manual that shows a machine file.
 const MANUAL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/building-your-own.md");
 
-/// A folder with the file `my.toml`.
 fn folder_with(machine: &str) -> TempDir {
-    let folder = TempDir::new().unwrap();
-    fs::write(folder.path().join("my.toml"), machine).unwrap();
-    folder
+    common::folder_with("my.toml", machine)
 }
 
-/// The output for this machine, with further arguments.
 #[track_caller]
 fn printed(machine: &str, arguments: &[&str]) -> String {
     said(folder_with(machine).path(), &[&["design", "--machine", "my.toml"], arguments].concat())
-}
-
-/// Asserts that this machine is refused with these words.
-#[track_caller]
-fn assert_no_machine(machine: &str, words: &str) {
-    assert_refused(folder_with(machine).path(), &["design", "--machine", "my.toml"], words);
 }
 
 /// The cells of the table's line that begins with `name`.
@@ -36,7 +26,6 @@ fn line<'a>(table: &'a str, name: &str) -> Vec<&'a str> {
     line.split("  ").map(str::trim).filter(|cell| !cell.is_empty()).collect()
 }
 
-/// The figure of this key.
 #[track_caller]
 fn figure<'a>(printed: &'a Value, key: &str) -> &'a Value {
     let figures = printed["figures"].as_array().expect("figures are a list");
@@ -56,10 +45,7 @@ fn without_a_file_the_papers_machine_is_calculated() {
 #[test]
 fn the_printed_machine_is_the_papers_and_can_be_read() {
     let machine = said(Path::new("."), &["design", "--print-machine"]);
-    assert!(
-        machine.contains("# Outer diameter (Table 1, no. 7). From 50 to 3000 mm.\ndiameter = \"400 mm\""),
-        "{machine}"
-    );
+    assert_has(&machine, ["# Outer diameter (Table 1, no. 7). From 50 to 3000 mm.\ndiameter = \"400 mm\""]);
     let paper = said(Path::new("."), &["design"]);
     assert_eq!(printed(&machine, &[]), paper);
 }
@@ -105,44 +91,20 @@ fn nothing_has_to_be_changed_on_the_manuals_machine() {
 }
 
 #[test]
-fn an_unknown_key_is_refused_with_file_line_and_the_known_keys() {
-    assert_no_machine("[wheel]\ndiametre = \"400 mm\"\n", "my.toml, line 2: wheel.diametre: unknown field `diametre`");
-    assert_no_machine("[wheel]\ndiametre = \"400 mm\"\n", "`diameter`");
-}
-
-#[test]
-fn a_wrong_unit_is_refused_with_the_right_ones() {
-    let right = "my.toml, line 2: wheel.diameter: \"0.4 kg\" is not a length: write a number and mm, cm or m";
-    assert_no_machine("[wheel]\ndiameter = \"0.4 kg\"\n", right);
-    assert_no_machine("[wheel]\ndiameter = 400\n", "the paper's machine has diameter = \"400 mm\"");
-}
-
-#[test]
-fn a_negative_length_is_refused_with_its_range() {
-    assert_no_machine(
-        "[wheel]\nwidth = \"-35 mm\"\n",
-        "my.toml, line 2: wheel.width is -35 mm: it has to be from 5 to 1000 mm",
-    );
-}
-
-#[test]
-fn a_friction_angle_of_90_degrees_is_refused_with_its_range() {
-    assert_no_machine(
-        "[crop]\nweed_friction = \"90 degrees\"\n",
-        "line 2: crop.weed_friction is 90 degrees: it has to be from 5 to 85",
-    );
-}
-
-#[test]
-fn a_gear_box_that_no_sprocket_fits_is_refused_with_one_that_would() {
-    assert_no_machine("[engine]\ngear_box_ratio = 1\n", "a ratio near 38 makes it 40 teeth");
-    assert_no_machine("[engine]\nspeed = \"10 rpm\"\n", "my.toml, line 2: engine.gear_box_ratio is 40");
-    assert_no_machine("[engine]\nspeed = \"10 rpm\"\n", "change engine.speed, weeder.speed or wheel.diameter");
-}
-
-#[test]
-fn a_file_that_does_not_exist_is_named() {
-    assert_refused(Path::new("."), &["design", "--machine", "no-such.toml"], "no-such.toml");
+fn a_wrong_machine_is_refused_with_file_line_and_what_would_be_right() {
+    for (machine, why) in [
+        ("[wheel]\ndiametre = \"400 mm\"\n", "my.toml, line 2: wheel.diametre: unknown field `diametre`"),
+        ("[wheel]\nwidth = \"-35 mm\"\n", "my.toml, line 2: wheel.width is -35 mm: it has to be from 5 to 1000 mm"),
+        (
+            "[crop]\nweed_friction = \"90 degrees\"\n",
+            "line 2: crop.weed_friction is 90 degrees: it has to be from 5 to 85",
+        ),
+        ("[engine]\ngear_box_ratio = 1\n", "a ratio near 38 makes it 40 teeth"),
+        ("[engine]\nspeed = \"10 rpm\"\n", "my.toml, line 2: engine.gear_box_ratio is 40"),
+        ("[engine]\nspeed = \"10 rpm\"\n", "change engine.speed, weeder.speed or wheel.diameter"),
+    ] {
+        assert_refused(folder_with(machine).path(), &["design", "--machine", "my.toml"], why);
+    }
 }
 
 #[test]
@@ -152,25 +114,23 @@ fn the_swing_comes_as_settings_for_the_firmware() {
     // 95 + 10 + 27.5 mm of an arm of 350 are 22.2 degrees or 247 us, rounded to 250: 22.5 degrees, half of the pulse
     // for 45. The soil takes 19.7 of 60 kg cm, which leaves two thirds of the speed: 89 ms. Arm and blade have a time
     // constant of 46 ms.
-    for line in [
+    let lines = [
         "The tool clears a canopy of 190 mm at 22.5 degrees, 134 mm aside, 250 us of the pulse away from the row.",
         "From rest, with 0.6 kg to move and 33 % of the servo's torque for the soil, it takes 133 ms: time the servo",
         "Between tool and sweeps 22.5 mm on either side of the row are not weeded: a tool of 100 mm would fill that",
         "\nset servo_in_us 1500\nset servo_out_us 1750\nset lead_out_ms 220\nset lead_in_ms 50\n",
-    ] {
-        assert!(words.contains(line), "{line:?} is not in\n{words}");
-    }
+    ];
+    assert_has(&words, lines);
     let json: Value = serde_json::from_str(&printed(machine, &["--json"])).unwrap();
-    assert_eq!(
-        (json["swing"]["servo_out_us"].as_u64(), json["set"][1].as_str()),
-        (Some(1750), Some("set servo_out_us 1750"))
-    );
+    assert_eq!((&json["swing"]["servo_out_us"], &json["set"][1]), (&1750.into(), &"set servo_out_us 1750".into()));
 }
 
 #[test]
 fn an_impossible_swing_is_explained() {
-    let words = printed("[intra_row]\nshank_length = \"120 mm\"\n", &[]);
-    assert!(words.contains("an arm of 120 mm cannot bring the tool 130 mm aside"), "{words}");
-    let words = printed("[intra_row]\nservo_torque = \"20 kg cm\"\n", &[]);
-    assert!(words.contains("the soil takes 39.4 of the servo's 20.0 kg cm: it stalls"), "{words}");
+    for (machine, why) in [
+        ("shank_length = \"120 mm\"", "an arm of 120 mm cannot bring the tool 130 mm aside"),
+        ("servo_torque = \"20 kg cm\"", "the soil takes 39.4 of the servo's 20.0 kg cm: it stalls"),
+    ] {
+        assert_has(&printed(&format!("intra_row.{machine}"), &[]), [why]);
+    }
 }

@@ -1,10 +1,10 @@
 //! Outputs of commands: an output that cannot be written is an error before the work, and never loses a result after
 //! it.
 
-use crate::common::{self, SMALL};
+use crate::common::{self, SMALL, assert_fails, assert_has, said, told};
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
 /// Runs `weeder` with these arguments in a folder that has a small field.
 fn weeder(folder: &Path, arguments: &[&str]) -> Output {
@@ -69,13 +69,11 @@ fn a_folder_is_no_file_and_a_file_is_no_folder() {
             }
         };
         let output = weeder(folder.path(), &[arguments, &[name]].concat());
-        let message = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
-        assert!(message.contains(wrong), "{arguments:?}: {message}");
+        assert_fails(&output, wrong);
     }
     let folder = tempfile::tempdir().unwrap();
     let output = weeder(folder.path(), &["trial", "--field", "small.toml", "--out", "report.html"]);
-    assert!(String::from_utf8_lossy(&output.stderr).contains("report.html is named like a file"));
+    assert_has(&told(&output), ["report.html is named like a file"]);
     assert!(!folder.path().join("report.html").exists());
 }
 
@@ -115,13 +113,12 @@ fn an_existing_folder_called_report_does_not_stop_a_command() {
     // An obstacle to a file is reported before the work.
     fs::create_dir_all(folder.path().join("old/trial.csv")).unwrap();
     let output = weeder(folder.path(), &[WRITERS[0].0, &["old"]].concat());
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert!(message.contains("old/trial.csv is a folder, and a file would take its place"), "{message}");
+    assert_has(&told(&output), ["old/trial.csv is a folder, and a file would take its place"]);
     fs::create_dir(folder.path().join("linked")).unwrap();
     std::os::unix::fs::symlink("/proc/version", folder.path().join("linked/trial.csv")).unwrap();
     let output = weeder(folder.path(), &[WRITERS[0].0, &["linked"]].concat());
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert!(output.stdout.is_empty() && message.contains("linked/trial.csv cannot be written: "), "{message}");
+    assert!(output.stdout.is_empty());
+    assert_has(&told(&output), ["linked/trial.csv cannot be written: "]);
 }
 
 #[test]
@@ -129,9 +126,7 @@ fn the_table_is_printed_even_if_the_file_cannot_be_written() {
     let folder = tempfile::tempdir().unwrap();
     let sweep = ["sweep", "--field", "small.toml", "--x", "k=1..3:2", "--out", "/dev/full"];
     let output = weeder(folder.path(), &sweep);
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{message}");
-    assert!(message.contains("/dev/full cannot be written: No space left on device"), "{message}");
+    assert_fails(&output, "/dev/full cannot be written: No space left on device");
     assert!(String::from_utf8_lossy(&output.stdout).contains("damage"));
 }
 
@@ -148,9 +143,8 @@ fn output_to_a_device_goes_there() {
 #[test]
 fn every_out_is_a_folder_or_a_file_by_its_name_in_the_help() {
     for command in ["trial", "evaluate", "plan", "sim", "sweep", "train", "record"] {
-        let output = Command::new(env!("CARGO_BIN_EXE_weeder")).args([command, "--help"]).output().unwrap();
         // It is wrapped.
-        let help = String::from_utf8_lossy(&output.stdout).split_whitespace().collect::<Vec<_>>().join(" ");
+        let help = said(Path::new("."), &[command, "--help"]).split_whitespace().collect::<Vec<_>>().join(" ");
         let is_folder = help.contains("--out <FOLDER>") && help.contains("into this folder, and create it if needed");
         assert!(is_folder || help.contains("--out <FILE."), "{command}: {help}");
     }
@@ -159,18 +153,14 @@ fn every_out_is_a_folder_or_a_file_by_its_name_in_the_help() {
 #[test]
 fn a_folder_s_file_is_no_other_file_of_its_command() {
     let folder = tempfile::tempdir().unwrap();
-    let run = |words: &[&str]| weeder(folder.path(), words);
-    assert!(run(&["sim", "--plants", "2", "--weeds", "0", "--out", "there"]).status.success());
+    said(folder.path(), &["sim", "--plants", "2", "--weeds", "0", "--out", "there"]);
     let row = fs::read(folder.path().join("there/row.csv")).unwrap();
     for words in [
         &["sim", "--row", "there/row.csv", "--out", "there", "--force"][..],
         &["sim", "--plants", "2", "--weeds", "0", "--out", "new", "--vcd", "new/row.csv"],
     ] {
         fs::create_dir_all(folder.path().join("new")).unwrap();
-        let output = run(words);
-        let message = String::from_utf8_lossy(&output.stderr);
-        assert!(message.contains("row.csv has two uses in this command: name another folder"), "{words:?}: {message}");
-        assert_eq!(output.status.code(), Some(2), "{words:?}");
+        assert_fails(&weeder(folder.path(), words), "row.csv has two uses in this command: name another folder");
     }
     assert_eq!(fs::read(folder.path().join("there/row.csv")).unwrap(), row);
 }

@@ -1,13 +1,12 @@
 //! `weeder evaluate` as a user runs it: on the manual's example, on trials that are too small for a model, and on wrong
 //! tables.
 
-use crate::common::{assert_refused, said, weeder};
+use crate::common::{self, assert_has, assert_refused, said};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 
-/// The manual's example.
 const EXAMPLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/trial-example.csv");
 
 const HEADER: &str =
@@ -15,9 +14,7 @@ const HEADER: &str =
 
 /// A folder with the file `trial.csv`, of these lines below the header.
 fn folder_with(lines: &str) -> TempDir {
-    let folder = TempDir::new().unwrap();
-    fs::write(folder.path().join("trial.csv"), format!("{HEADER}{lines}")).unwrap();
-    folder
+    common::folder_with("trial.csv", &format!("{HEADER}{lines}"))
 }
 
 /// Asserts that the table is refused with this message, and that no report was begun.
@@ -30,16 +27,15 @@ fn assert_not_judged(folder: &TempDir, message: &str) {
 #[test]
 fn the_manual_s_example_is_evaluated_in_plain_words_and_tables() {
     let said = said(Path::new("."), &["evaluate", EXAMPLE]);
-    for line in [
+    let lines = [
         "24 plots of 8 treatments (1, 1.5, 2 and 2.5 km/h; 50 and 60 cm), 3 of each treatment.",
         "13 of 1318 plants were damaged: 0.99 %, two-sided 95 % interval 0.52 to 1.69 %. At most 4.00 % in each of these plots",
         "the odds that a plant is damaged are 4.49 times as high for each km/h more (1.17 to 17.24; p = 0.0306)",
         "Performance index scatters more at some speeds or spacings than at others (p = 0.0192): its p-values are not exact.",
         "Plant damage rises by 1.292 points for each km/h (p = 0.0119) and shows no effect of spacing (p = 0.5347)",
         "- Eq. 29 has -0.2068 a cm, where the text has +0.2068: one sign is wrong.",
-    ] {
-        assert!(said.contains(line), "{line:?} is not in\n{said}");
-    }
+    ];
+    assert_has(&said, lines);
     assert!(!said.contains("NaN") && !said.contains(" inf"), "{said}");
 }
 
@@ -134,8 +130,7 @@ fn a_log_gives_each_plot_its_speed_and_what_the_table_leaves_empty() {
     let labelled = format!("plot,{HEADER}P1,1,1.8,50,100,12,,0,,,0.4,2.5\nP2,1,3.6,50,100,18,,1,,,0.4,2.5\n");
     fs::write(folder.path().join("trial.csv"), labelled).unwrap();
     assert_refused(folder.path(), &one[..4], "replication 1 of 1.8 km/h and 50 cm has no number of its own");
-    let told = String::from_utf8(weeder(folder.path(), &one[..2]).stdout).unwrap();
-    assert!(told.contains("each plot once: plots are numbered in the order of the lines"), "{told}");
+    assert_has(&said(folder.path(), &one[..2]), ["each plot once: plots are numbered in the order of the lines"]);
 }
 
 #[test]
@@ -145,68 +140,37 @@ fn a_trial_without_damage_or_replications_is_evaluated_partly() {
          1,2,50,100,18,60,0,12,65,0.4,2.5\n1,2,60,100,17,50,0,12,64,0.4,2.5\n",
     );
     let said = said(folder.path(), &["evaluate", "trial.csv"]);
-    for line in [
+    let lines = [
         "None of 220 plants was damaged: below 1.36 % (one-sided 95 % bound).",
         "Plant damage has no model: it is 0 in every plot",
         "No analysis of variance: it is 0 in every plot",
         "No analysis of variance: plots: 4, parameters: 3: this model takes at least 6 plots.",
-    ] {
-        assert!(said.contains(line), "{line:?} is not in\n{said}");
-    }
+    ];
+    assert_has(&said, lines);
     assert!(!said.contains("NaN"), "{said}");
 }
 
 #[test]
 fn a_single_plot_has_its_measures_and_no_model() {
     let folder = folder_with("1,1.5,50,200,30,50,1,24,180,0.4,2.5\n");
-    let said = said(folder.path(), &["evaluate", "trial.csv"]);
-    assert!(said.contains("159.94") && said.contains("Weeding efficiency has no model"), "{said}");
+    assert_has(&said(folder.path(), &["evaluate", "trial.csv"]), ["159.94", "Weeding efficiency has no model"]);
 }
 
 #[test]
 fn ground_covered_faster_than_the_machine_drives_is_pointed_out() {
     let folder = folder_with("1,1,50,100,12,60,0,12,127,0.4,2.5\n2,1,50,100,10,50,0,12,12,0.4,2.5\n");
     let said = said(folder.path(), &["evaluate", "trial.csv"]);
-    assert!(said.contains("Plot 2: more ground was covered than speed and width allow"), "{said}");
+    assert_has(&said, ["Plot 2: more ground was covered than speed and width allow"]);
 }
 
 #[test]
-fn a_wrong_line_is_named_and_nothing_is_written() {
-    let good = "1,1.5,50,200,30,50,1,24,180,0.4,2.5\n";
-    for (wrong, message) in [
-        ("2,1.5,50,200,30,50,60,24,180,0.4,2.5", "trial.csv, line 3: damaged is 60: it cannot exceed plants"),
-        ("2,1.5,50,200,30,50,1,0,180,0.4,2.5", "trial.csv, line 3: area_m2 is 0: it has to be from 0.01 to"),
-        ("2,1.5,50,200,30,50,1,a lot,180,0.4,2.5", "trial.csv, line 3: area_m2 is `a lot`: it has to be a number"),
-        (
-            "1,1.5,50,200,30,50,1,24,180,0.4,2.5",
-            "trial.csv, line 3: replication 1 of 1.5 km/h and 50 cm is already in line 2",
-        ),
-    ] {
-        assert_not_judged(&folder_with(&format!("{good}{wrong}\n")), message);
-    }
-}
-
-#[test]
-fn a_missing_column_is_named() {
-    let folder = folder_with("");
-    fs::write(folder.path().join("trial.csv"), "replication,speed_km_h\n1,1\n").unwrap();
-    assert_not_judged(
-        &folder,
-        "trial.csv, line 1: the column `spacing_cm` is missing: the header has to name replication,",
-    );
-}
-
-#[test]
-fn a_file_that_does_not_exist_is_named() {
+fn a_wrong_table_is_named_and_nothing_is_written() {
+    let line = "1,1.5,50,200,30,50,1,24,180,0.4,2.5\n";
+    let twice = "trial.csv, line 3: replication 1 of 1.5 km/h and 50 cm is already in line 2";
+    assert_not_judged(&folder_with(&line.repeat(2)), twice);
+    let missing = "trial.csv, line 1: the column `spacing_cm` is missing: the header has to name replication,";
+    assert_not_judged(&common::folder_with("trial.csv", "replication,speed_km_h\n1,1\n"), missing);
     assert_not_judged(&TempDir::new().unwrap(), "trial.csv cannot be read");
-}
-
-#[test]
-fn a_report_that_cannot_be_written_is_an_error() {
-    let folder = TempDir::new().unwrap();
-    fs::write(folder.path().join("report"), "a file, no folder").unwrap();
-    let file = "report is a file: name a folder";
-    assert_refused(folder.path(), &["evaluate", EXAMPLE, "--out", "report"], file);
 }
 
 #[test]

@@ -2,11 +2,12 @@
 //!
 //! The tests wait for results, not for fixed times, because a busy PC may be slow.
 
+use crate::common::{Running, assert_fails, assert_has, command, told};
 use std::fs;
-use std::io::{BufRead, BufReader, ErrorKind, Write};
+use std::io::{ErrorKind, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Command, Stdio};
 use std::thread;
 use std::time::Duration;
 use uno::elf::Image;
@@ -21,54 +22,14 @@ const BOOTLOADERS: &str = "/usr/share/arduino/hardware/arduino/avr/bootloaders";
 /// Timeout of an answer: a hundred times the time on a busy PC.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-fn weeder() -> Command {
-    Command::new(env!("CARGO_BIN_EXE_weeder"))
-}
-
 fn old_bootloader() -> PathBuf {
     Path::new(BOOTLOADERS).join("atmega/ATmegaBOOT_168_atmega328.hex")
 }
 
-/// Asserts status 2 and a message that contains `words`.
+/// `weeder virtual-uno`, once its port is there.
 #[track_caller]
-fn assert_refused(output: &Output, words: &str) {
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{message}");
-    assert!(message.contains(words), "{message}");
-}
-
-/// `weeder virtual-uno` in its own process.
-struct VirtualUno {
-    process: Child,
-}
-
-impl VirtualUno {
-    /// Starts it, and waits for its port.
-    #[track_caller]
-    fn start(arguments: &[&Path]) -> VirtualUno {
-        let mut process =
-            weeder().arg("virtual-uno").args(arguments).stdout(Stdio::piped()).spawn().expect("cargo has built it");
-        let mut line = String::new();
-        let stdout = process.stdout.take().expect("it is piped");
-        BufReader::new(stdout).read_line(&mut line).expect("it says where its port is");
-        assert!(!line.is_empty(), "it ended before its port was there");
-        VirtualUno { process }
-    }
-
-    /// Ends it by Ctrl-C. Returns whether it succeeded.
-    fn interrupt(mut self) -> bool {
-        let id = self.process.id().to_string();
-        assert!(Command::new("kill").args(["-INT", &id]).status().expect("kill is there").success());
-        self.process.wait().expect("it ends").success()
-    }
-}
-
-impl Drop for VirtualUno {
-    fn drop(&mut self) {
-        // It may have ended.
-        let _ = self.process.kill();
-        let _ = self.process.wait();
-    }
+fn virtual_uno(arguments: &[&Path]) -> Running {
+    Running::with_first_line(command(&["virtual-uno"]).args(arguments)).0
 }
 
 /// Reads until one of these texts has come. Returns the whole text.
@@ -86,8 +47,7 @@ fn read_until(port: &mut dyn serialport::SerialPort, texts: &[&str]) -> String {
     String::from_utf8_lossy(&heard).into_owned()
 }
 
-/// Optiboot, the Uno's bootloader, compiled from the sources in arduino-core-avr. Debian's compiled file is longer than
-/// its boot section.
+/// Optiboot, the Uno's bootloader, compiled from arduino-core-avr. Debian's compiled file is too long.
 fn optiboot(folder: &Path) -> PathBuf {
     let (elf, hex) = (folder.join("optiboot.elf"), folder.join("optiboot.hex"));
     let mut compiler = Command::new("avr-gcc");
@@ -103,12 +63,11 @@ fn optiboot(folder: &Path) -> PathBuf {
     hex
 }
 
-/// Flashes an Uno with `weeder flash`. On a busy PC avrdude may miss the bootloader's time window, so this tries again,
-/// as a user would.
+/// Flashes an Uno. On a busy PC avrdude may miss the bootloader's time window: it tries again, as a user would.
 #[track_caller]
 fn flash(port: &Path, arguments: &[&str]) {
     let flashed = (0..5).any(|_| {
-        let status = weeder().arg("flash").args(arguments).arg("--port").arg(port).status();
+        let status = command(&["flash"]).args(arguments).arg("--port").arg(port).status();
         status.expect("cargo has built it").success()
     });
     assert!(flashed, "avrdude's own words stand above");
@@ -159,11 +118,11 @@ fn an_empty_uno_is_flashed_through_optiboot_and_answers() {
     let mut arguments = vec![Path::new("--stand"), Path::new("--bootloader")];
     let bootloader = optiboot(folder.path());
     arguments.extend([&bootloader, Path::new("--link"), &link, Path::new("--eeprom"), &eeprom]);
-    let uno = VirtualUno::start(&arguments);
+    let uno = virtual_uno(&arguments);
     flash(&link, &[]);
 
     assert_talks(&link);
-    assert!(uno.interrupt(), "Ctrl-C ends it well");
+    uno.interrupt();
     assert!(!link.is_symlink(), "it takes its link with it");
     assert_eq!(fs::metadata(&eeprom).unwrap().len(), 1024);
 }
@@ -172,7 +131,7 @@ fn flashing_with_the_old_bootloader_reaches_the_last_byte() {
     let folder = tempfile::tempdir().unwrap();
     let link = folder.path().join("uno");
     let arguments = [Path::new("--stand"), Path::new("--bootloader"), &old_bootloader(), Path::new("--link"), &link];
-    let _uno = VirtualUno::start(&arguments);
+    let _uno = virtual_uno(&arguments);
     let elf = elf_of(folder.path(), 30_720);
     // avrdude reads back what it has written.
     flash(&link, &["--old-bootloader", "--unproved", "--elf", elf.to_str().expect("it is text")]);
@@ -184,19 +143,18 @@ fn a_firmware_that_reaches_into_the_old_bootloader_is_refused() {
     let pty = Pty::open().unwrap();
     let elf = elf_of(folder.path(), 30_722);
     let flash = |arguments: &[&str]| {
-        let mut command = weeder();
-        command.args(["flash", "--unproved"]).args(arguments).arg("--port").arg(pty.path()).arg("--elf").arg(&elf);
+        let mut flash = command(&["flash", "--unproved"]);
+        flash.args(arguments).arg("--port").arg(pty.path()).arg("--elf").arg(&elf);
         // Without a PATH there is no avrdude.
-        command.env("PATH", folder.path()).output().unwrap()
+        flash.env("PATH", folder.path()).output().unwrap()
     };
-    assert_refused(&flash(&["--old-bootloader"]), "takes 30722 bytes of flash: the bootloader leaves 30720");
-    assert_refused(
+    assert_fails(&flash(&["--old-bootloader"]), "takes 30722 bytes of flash: the bootloader leaves 30720");
+    assert_fails(
         &flash(&[]),
         "avrdude cannot be started: `sudo apt install avrdude`, your system's package avrdude, or ./setup.sh installs it, or",
     );
 }
 
-/// A script that replaces avrdude.
 fn avrdude(folder: &Path, script: &str) {
     let avrdude = folder.join("avrdude");
     fs::write(&avrdude, format!("#!/bin/sh\n{script}")).unwrap();
@@ -212,17 +170,14 @@ fn an_elf_with_unproved_bounds_is_flashed_only_with_unproved() {
     fs::write(elf.with_extension("hex"), "mine").unwrap();
     avrdude(folder.path(), "echo \"$@\" >\"${0%/*}/called\"");
     let called = folder.path().join("called");
-    let run = |words: &[&str]| {
-        let mut command = weeder();
-        command.args(words).arg("--elf").arg(&elf).env("PATH", folder.path()).output().unwrap()
-    };
+    let run = |words: &[&str]| command(words).arg("--elf").arg(&elf).env("PATH", folder.path()).output().unwrap();
     let port = pty.path().to_str().expect("it is text");
     let out = folder.path().join("out.hex");
     let out_name = out.to_str().expect("it is text");
     for words in [&["flash", "--port", port][..], &["hex", out_name]] {
         let output = run(words);
-        assert_refused(&output, "the bounds of ");
-        assert_refused(&output, "--unproved writes it all the same");
+        assert_fails(&output, "the bounds of ");
+        assert_fails(&output, "--unproved writes it all the same");
         assert!(!called.exists() && !out.exists(), "{words:?}");
         assert!(output.stdout.is_empty());
     }
@@ -230,12 +185,8 @@ fn an_elf_with_unproved_bounds_is_flashed_only_with_unproved() {
         [(&["flash", "--unproved", "--port", port][..], &called), (&["hex", "--unproved", out_name], &out)]
     {
         let output = run(words);
-        let told = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success() && written.exists(), "{words:?}: {told}");
-        assert!(
-            told.contains("Warning: the bounds of ") && told.contains("its stack may overwrite its data"),
-            "{told}"
-        );
+        assert!(output.status.success() && written.exists(), "{words:?}: {output:?}");
+        assert_has(&told(&output), ["Warning: the bounds of ", "its stack may overwrite its data"]);
     }
     assert_eq!(fs::read_to_string(elf.with_extension("hex")).unwrap(), "mine");
 }
@@ -270,18 +221,17 @@ fn a_row_is_flashed_by_its_name() {
     avrdude(folder.path(), "echo \"$@\" >\"${0%/*}/called\"");
     let elf = elf_of(folder.path(), 100);
     let flash = |port: &str| {
-        let mut command = weeder();
-        command.args(["flash", "--unproved", "--port", port, "--rows-file"]).arg(&names).arg("--elf").arg(&elf);
-        command.env("PATH", folder.path()).output().unwrap()
+        let mut flash = command(&["flash", "--unproved", "--port", port, "--rows-file"]);
+        flash.arg(&names).arg("--elf").arg(&elf).env("PATH", folder.path()).output().unwrap()
     };
     let output = flash("left");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{}", told(&output));
     let said = String::from_utf8_lossy(&output.stdout);
-    assert!(said.contains(&format!("`weeder monitor --port '{}'`", link.display())), "{said}");
+    assert_has(&said, [&*format!("`weeder monitor --port '{}'`", link.display())]);
     let called = fs::read_to_string(folder.path().join("called")).unwrap();
     let device = link.canonicalize().unwrap();
     assert!(called.contains(&format!("-P {} ", device.display())), "{called}");
-    assert_refused(&flash("right"), "there is no port right");
+    assert_fails(&flash("right"), "there is no port right");
 }
 
 #[test]
@@ -289,8 +239,8 @@ fn a_firmware_that_reaches_into_optiboot_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let pty = Pty::open().unwrap();
     let elf = elf_of(folder.path(), 32_258);
-    let output = weeder().args(["flash", "--elf"]).arg(elf).arg("--port").arg(pty.path()).output().unwrap();
-    assert_refused(&output, "takes 32258 bytes of flash: the bootloader leaves 32256");
+    let output = command(&["flash", "--elf"]).arg(elf).arg("--port").arg(pty.path()).output().unwrap();
+    assert_fails(&output, "takes 32258 bytes of flash: the bootloader leaves 32256");
 }
 
 #[test]
@@ -300,19 +250,17 @@ fn a_busy_port_is_named_and_a_file_is_no_port() {
     for (path, why) in
         [(pty.path(), "is in use: close the serial monitor"), (file.path(), "cannot be opened as a serial port")]
     {
-        let output = weeder().args(["flash", "--port"]).arg(path).output().unwrap();
-        assert_refused(&output, why);
+        assert_fails(&command(&["flash", "--port"]).arg(path).output().unwrap(), why);
     }
 }
 
 /// Flashes an ELF of 100 bytes with this script in avrdude's place.
 fn flash_with(folder: &Path, port: &Path, script: &str) -> Command {
     avrdude(folder, script);
-    let mut command = weeder();
-    command.args(["flash", "--unproved", "--elf"]).arg(elf_of(folder, 100)).arg("--port").arg(port);
+    let mut flash = command(&["flash", "--unproved", "--elf"]);
     // The script takes its own commands from the system's folders.
-    command.env("PATH", format!("{}:/usr/bin:/bin", folder.display()));
-    command
+    flash.arg(elf_of(folder, 100)).arg("--port").arg(port).env("PATH", format!("{}:/usr/bin:/bin", folder.display()));
+    flash
 }
 
 #[test]
@@ -323,8 +271,8 @@ fn the_advice_comes_after_each_of_avrdude_s_words_once() {
          echo \"avrdude: stk500_getsync() attempt $n of 10: not in sync: resp=0x0$n\" >&2\ndone\nexit 1\n";
     let output = flash_with(folder.path(), pty.path(), script).output().unwrap();
     // No bootloader answers at the other rate, so the other option is no help.
-    assert_refused(&output, "no bootloader answers at 115200 or 57600 baud: pull D0 and D1 free");
-    let message = String::from_utf8_lossy(&output.stderr);
+    assert_fails(&output, "no bootloader answers at 115200 or 57600 baud: pull D0 and D1 free");
+    let message = told(&output);
     assert_eq!(message.matches("not in sync").count(), 1);
     assert!(!message.contains("--old-bootloader"), "{message}");
     let said = String::from_utf8_lossy(&output.stdout);
@@ -338,7 +286,7 @@ fn another_chip_is_named_by_its_signature() {
     for (signature, chip) in [("0x1e9516 (probably m328pb)", "ATmega328PB"), ("1E 95 14 (ATmega328)", "ATmega328")] {
         let script = format!("echo 'avrdude: device signature = {signature}' >&2\nexit 1\n");
         let output = flash_with(folder.path(), pty.path(), &script).output().unwrap();
-        assert_refused(&output, &format!("the board has another chip, {chip}: nothing was written"));
+        assert_fails(&output, &format!("the board has another chip, {chip}: nothing was written"));
     }
 }
 
@@ -382,7 +330,7 @@ fn after_a_failure_the_bootloader_is_asked_what_is_wrong() {
         let output = flash_with(folder.path(), &port, "exit 1\n").output().unwrap();
         fs::write(over, "").unwrap();
         bootloader.join().unwrap();
-        assert_refused(&output, words);
+        assert_fails(&output, words);
     }
 }
 
@@ -399,11 +347,11 @@ fn two_flashes_of_one_port_are_kept_apart() {
     }
     let port = fs::canonicalize(&link).unwrap();
     let refused = flash_with(second.path(), &port, "touch \"${0%/*}/began\"\n").output().unwrap();
-    let monitor = weeder().args(["monitor", "--plain", "--port"]).arg(&port).output().unwrap();
+    let monitor = command(&["monitor", "--plain", "--port"]).arg(&port).output().unwrap();
     fs::write(first.path().join("end"), "").unwrap();
     assert!(writing.wait().unwrap().success());
-    assert_refused(&refused, "is being flashed by another program: wait until that has ended");
-    assert_refused(&monitor, "is being flashed by another program");
+    assert_fails(&refused, "is being flashed by another program: wait until that has ended");
+    assert_fails(&monitor, "is being flashed by another program");
     assert!(!second.path().join("began").exists());
 }
 
@@ -417,24 +365,23 @@ fn an_elf_for_another_chip_is_refused_also_unproved() {
         let mut compiler = Command::new("avr-gcc");
         compiler.arg(format!("-mmcu={chip}")).arg("-o").args([&elf, &source]);
         assert!(compiler.status().expect("avr-gcc is there: setup.sh installs it").success());
-        let mut command = weeder();
-        command.args(["flash", "--unproved", "--elf"]).arg(&elf).arg("--port").arg(pty.path());
-        let output = command.env("PATH", folder.path()).output().unwrap();
-        assert_refused(&output, &format!("is for the {chip}: the Uno has an atmega328p"));
+        let mut flash = command(&["flash", "--unproved", "--elf"]);
+        let output = flash.arg(&elf).arg("--port").arg(pty.path()).env("PATH", folder.path()).output().unwrap();
+        assert_fails(&output, &format!("is for the {chip}: the Uno has an atmega328p"));
     }
 }
 
 #[test]
 fn bootloaders_that_are_none_are_refused() {
-    let virtual_uno = |file: &Path| weeder().args(["virtual-uno", "--bootloader"]).arg(file).output().unwrap();
-    assert_refused(&virtual_uno(Path::new("no-such.hex")), "no-such.hex cannot be read: No such file");
+    let virtual_uno = |file: &Path| command(&["virtual-uno", "--bootloader"]).arg(file).output().unwrap();
+    assert_fails(&virtual_uno(Path::new("no-such.hex")), "no-such.hex cannot be read: No such file");
     let optiboot = Path::new(BOOTLOADERS).join("optiboot/optiboot_atmega328.hex");
     // Debian's is longer than its boot section.
-    assert_refused(&virtual_uno(&optiboot), "it fills flash from 0x7e00 to 0x8014");
+    assert_fails(&virtual_uno(&optiboot), "it fills flash from 0x7e00 to 0x8014");
     let folder = tempfile::tempdir().unwrap();
     let text = folder.path().join("notes.hex");
     fs::write(&text, "notes\n").unwrap();
-    assert_refused(&virtual_uno(&text), "is no Intel HEX file");
+    assert_fails(&virtual_uno(&text), "is no Intel HEX file");
 }
 
 #[test]
@@ -442,9 +389,9 @@ fn a_link_does_not_take_a_file_s_place() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("mine");
     fs::write(&file, "mine").unwrap();
-    let mut command = weeder();
-    command.args(["virtual-uno", "--bootloader"]).arg(old_bootloader()).arg("--link").arg(&file);
-    assert_refused(&command.output().unwrap(), "exists already and is no link to a pseudo terminal");
+    let mut uno = command(&["virtual-uno", "--bootloader"]);
+    uno.arg(old_bootloader()).arg("--link").arg(&file);
+    assert_fails(&uno.output().unwrap(), "exists already and is no link to a pseudo terminal");
     assert_eq!(fs::read_to_string(&file).unwrap(), "mine");
 }
 
@@ -453,8 +400,8 @@ fn the_hex_file_has_the_content_of_the_elf() {
     let folder = tempfile::tempdir().unwrap();
     let elf = firmware::build().expect("the firmware builds");
     let out = folder.path().join("weeder.hex");
-    let output = weeder().arg("hex").arg(&out).arg("--elf").arg(&elf).output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let output = command(&["hex"]).arg(&out).arg("--elf").arg(&elf).output().unwrap();
+    assert!(output.status.success(), "{}", told(&output));
     // Converted by binutils, an independent program.
     let binary = folder.path().join("weeder.bin");
     let mut objcopy = Command::new("avr-objcopy");
@@ -463,5 +410,5 @@ fn the_hex_file_has_the_content_of_the_elf() {
     assert_eq!(fs::read(&binary).unwrap(), Image::read(&elf).unwrap().flash);
 
     let nowhere = folder.path().join("no-such/weeder.hex");
-    assert_refused(&weeder().arg("hex").arg(&nowhere).arg("--elf").arg(&elf).output().unwrap(), "No such file");
+    assert_fails(&command(&["hex"]).arg(&nowhere).arg("--elf").arg(&elf).output().unwrap(), "No such file");
 }

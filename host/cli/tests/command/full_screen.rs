@@ -1,7 +1,8 @@
 //! The full-screen monitor on a terminal of 24 lines, with a virtual Uno at its port.
 
+use crate::common::{Running, command};
 use std::fs::{self, File};
-use std::process::{Child, Command};
+use std::process::Command;
 use std::thread::sleep;
 use std::time::Duration;
 use tempfile::TempDir;
@@ -23,7 +24,7 @@ const PAGE_UP: &str = "\x1b[5~";
 struct Terminal {
     pty: Pty,
     screen: vt100::Parser,
-    monitor: Child,
+    monitor: Running,
     _row: Background,
     folder: TempDir,
 }
@@ -41,10 +42,9 @@ impl Terminal {
         let size = ["rows".to_owned(), LINES.to_string(), "cols".to_owned(), COLUMNS.to_string()];
         assert!(Command::new("stty").arg("-F").arg(&path).args(size).status().expect("there is stty").success());
         let side = || File::options().read(true).write(true).open(&path).expect("it is there");
-        let mut monitor = Command::new(env!("CARGO_BIN_EXE_weeder"));
-        monitor.arg("monitor").arg("--port").arg(port).arg("--log").arg(log);
-        monitor.env("TERM", "xterm").stdin(side()).stdout(side()).stderr(side());
-        let monitor = monitor.spawn().expect("cargo has built the command");
+        let mut monitor = command(&["monitor", "--port"]);
+        monitor.arg(port).arg("--log").arg(log);
+        let monitor = Running::start(monitor.env("TERM", "xterm").stdin(side()).stdout(side()).stderr(side()));
         let mut terminal = Self { pty, screen: vt100::Parser::new(LINES, COLUMNS, 0), monitor, _row: row, folder };
         terminal.until(|text| text.contains("tool out"));
         terminal
@@ -67,7 +67,7 @@ impl Terminal {
             if count == 0 && status.is_some() {
                 break;
             }
-            status = self.monitor.try_wait().expect("it is a child");
+            status = self.monitor.0.try_wait().expect("it is a child");
             sleep(Duration::from_millis(5));
         }
         assert!(status.is_some_and(|status| status.success()), "{status:?}");
@@ -87,18 +87,10 @@ impl Terminal {
             if shows(&text) {
                 return text;
             }
-            assert_eq!(self.monitor.try_wait().expect("it is a child"), None, "it ended:\n{text}");
+            assert_eq!(self.monitor.0.try_wait().expect("it is a child"), None, "it ended:\n{text}");
             sleep(Duration::from_millis(5));
         }
         panic!("that is never shown:\n{}", self.screen.screen().contents());
-    }
-}
-
-impl Drop for Terminal {
-    fn drop(&mut self) {
-        // It may have ended.
-        let _ = self.monitor.kill();
-        let _ = self.monitor.wait();
     }
 }
 
@@ -140,6 +132,6 @@ fn esc_is_hold_with_any_key_behind_it_and_after_a_long_paste() {
 #[test]
 fn a_terminated_monitor_restores_the_terminal() {
     let mut terminal = Terminal::with_monitor();
-    Command::new("kill").args(["-TERM", &terminal.monitor.id().to_string()]).status().expect("there is a kill");
+    terminal.monitor.signal("-TERM");
     terminal.until_restored();
 }

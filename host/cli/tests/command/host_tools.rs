@@ -1,8 +1,7 @@
 //! The host tools at a pseudo terminal, as a user runs them, with the virtual Uno at its other end.
 
-use crate::typed::{printed, typed};
+use crate::common::{self, Running, assert_has, command, folder_with, printed, typed};
 use std::fs;
-use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::thread;
@@ -12,7 +11,6 @@ use uno_run::firmware;
 use uno_run::live::Setup;
 use uno_run::live::rows::{Background, LiveRows};
 
-/// How many lines of a kind a log has by now.
 fn lines_of(log: &Path, kind: &str) -> usize {
     let text = fs::read_to_string(log).unwrap_or_default();
     text.lines().filter(|line| line.split(',').nth(1) == Some(kind)).count()
@@ -46,12 +44,9 @@ fn a_receiver_plugged_in_again_continues_in_the_record() {
         receiver
     };
     let mut receiver = plug_in();
-    let mut record = Command::new(env!("CARGO_BIN_EXE_weeder"))
-        .args(["record", "--beam-ahead", "500", "--out"])
-        .args([&log, Path::new("--gps"), &port, Path::new("--port"), uno.path()])
-        .stderr(Stdio::null())
-        .spawn()
-        .expect("cargo has built the command");
+    let mut record = command(&["record", "--beam-ahead", "500", "--out"]);
+    record.args([&log, Path::new("--gps"), &port, Path::new("--port"), uno.path()]);
+    let record = Running::start(record.stderr(Stdio::null()));
     say_until(Some(&mut receiver), &log, "gps", 3);
     drop(receiver);
     say_until(None, &log, "gps_lost", 1);
@@ -61,11 +56,9 @@ fn a_receiver_plugged_in_again_continues_in_the_record() {
     say_until(Some(&mut receiver), &log, "gps_found", 2);
     let sentences = lines_of(&log, "gps");
     say_until(Some(&mut receiver), &log, "gps", sentences + 3);
-    let stop = Command::new("kill").args(["-INT", &record.id().to_string()]).status();
-    assert!(stop.expect("there is kill").success() && record.wait().expect("it ends").success());
+    record.interrupt();
 
-    let mapped =
-        Command::new(env!("CARGO_BIN_EXE_weeder")).arg("map").arg(&log).arg("-o").arg(&map).arg("--json").output();
+    let mapped = command(&["map", "--json"]).arg(&log).arg("-o").arg(&map).output();
     let counted: serde_json::Value = serde_json::from_str(&printed(&mapped.expect("it ends"), 0)).expect("it is JSON");
     let count = |name: &str| counted[0]["count"][name].as_u64().expect("a number");
     assert_eq!((counted[0]["record"].as_str(), count("receiver_losses"), count("plants")), (Some("field.csv"), 1, 0));
@@ -89,7 +82,7 @@ fn uno_with(eeprom: Option<PathBuf>) -> Background {
 
 /// Runs `weeder` with these words, then `--port` and the port, and this input.
 fn weeder(words: &[&str], port: &Path, input: impl AsRef<[u8]>) -> Output {
-    typed(Command::new(env!("CARGO_BIN_EXE_weeder")).args(words).arg("--port").arg(port), input)
+    typed(command(words).arg("--port").arg(port), input)
 }
 
 #[test]
@@ -104,8 +97,8 @@ fn settings_are_pulled_changed_compared_and_pushed() {
     assert!(text.contains("\n# 200 to 800 mm, default 400\nwheel_mm = 400\n"), "{text}");
     // A machine that has lost its settings has the factory's.
     let lost = printed(&weeder(&["settings", "pull", name, "--force"], uno.path(), ""), 2);
-    assert!(lost.contains("(alarm 5-1)") && lost.contains("machine.toml is not replaced"), "{lost}");
-    assert!(lost.contains("Then `clear` in `weeder monitor` ends the alarm"), "{lost}");
+    let words = ["(alarm 5-1)", "machine.toml is not replaced", "Then `clear` in `weeder monitor` ends the alarm"];
+    assert_has(&lost, words);
     let same = printed(&weeder(&["settings", "diff", name], uno.path(), ""), 0);
     assert!(same.starts_with("The machine has the settings of "), "{same}");
 
@@ -217,19 +210,29 @@ fn pushed_settings_survive_a_reset_unless_no_save_is_given() {
 
 #[test]
 fn the_settings_of_a_simulated_machine_are_not_pushed_to_a_real_one() {
-    let words = ["settings", "push", "paper"];
-    let error = printed(&weeder(&words, Path::new("/dev/no-such-port"), ""), 2);
-    assert!(error.contains("paper is a simulated machine, and its settings hold for no other"), "{error}");
+    assert_not_sent(
+        Path::new("."),
+        "settings push paper",
+        "paper is a simulated machine, and its settings hold for no other",
+    );
+}
+
+/// Asserts that a command is refused, and opens no port.
+#[track_caller]
+fn assert_not_sent(folder: &Path, words: &str, why: &str) {
+    let words: Vec<&str> = words.split(' ').chain(["--port", "/dev/no-such-port"]).collect();
+    common::assert_refused(folder, &words, why);
 }
 
 #[test]
-fn an_empty_file_has_no_settings_to_compare_or_to_push() {
-    let file = tempfile::NamedTempFile::new().expect("there is room for a file");
-    for action in ["diff", "push"] {
-        let words = ["settings", action, file.path().to_str().expect("it is text")];
-        let error = printed(&weeder(&words, Path::new("/dev/no-such-port"), ""), 2);
-        assert!(error.contains("names no setting: `weeder settings pull` writes them all"), "{error}");
+fn an_empty_or_wrong_file_is_refused_before_the_port_is_opened() {
+    let folder = folder_with("empty.toml", "");
+    for words in ["settings diff empty.toml", "settings push empty.toml"] {
+        assert_not_sent(folder.path(), words, "names no setting: `weeder settings pull` writes them all");
     }
+    let folder = folder_with("machine.toml", "k = 3\nwheel_mm = 400.5\n");
+    let wrong = "line 2: wheel_mm is `400.5`: it has to be a whole number, 200 to 800 mm";
+    assert_not_sent(folder.path(), "settings push machine.toml", wrong);
 }
 
 #[test]
@@ -237,17 +240,11 @@ fn a_second_virtual_uno_leaves_the_link_of_a_living_one_alone() {
     let folder = tempfile::tempdir().expect("there is room for a link");
     let link = folder.path().join("uno");
     let words = ["virtual-uno", "--stand", "--bootloader", "optiboot", "--link"];
-    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
-    let mut first = command.args(words).arg(&link).stdout(Stdio::piped()).spawn().expect("cargo has built the command");
-    let mut line = String::new();
-    BufReader::new(first.stdout.take().expect("it is piped")).read_line(&mut line).expect("it says where it is");
+    let (first, _) = Running::with_first_line(command(&words).arg(&link));
     let leads_to = fs::read_link(&link).expect("it is a link");
-    let second = Command::new(env!("CARGO_BIN_EXE_weeder")).args(words).arg(&link).output().expect("it ends");
-    let error = printed(&second, 2);
-    assert!(error.contains(&format!("which process {} (weeder) has", first.id())), "{error}");
+    let second = command(&words).arg(&link).output().expect("it ends");
+    common::assert_fails(&second, &format!("which process {} (weeder) has", first.0.id()));
     assert_eq!(fs::read_link(&link).expect("it is a link"), leads_to);
-    first.kill().expect("it runs");
-    first.wait().expect("it ends");
 }
 
 #[test]
@@ -262,30 +259,16 @@ fn a_virtual_uno_prints_the_next_command() {
         (&["--link", "uno", "--bootloader", "optiboot"], "weeder flash --port ./uno\n"),
         (&["--link", "uno", "--bootloader", old], "weeder flash --old-bootloader --port ./uno\n"),
     ] {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
-        let command = command.current_dir(&folder).args(["virtual-uno", "--stand", "--for", "1"]).args(words);
-        let output = command.output().expect("cargo has built the command");
-        let told = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(output.status.success() && told.contains(&format!("in another terminal: {next}")), "{words:?}: {told}");
+        let output = common::weeder(folder.path(), &[&["virtual-uno", "--stand", "--for", "1"], words].concat());
+        assert_has(&printed(&output, 0), [&*format!("in another terminal: {next}")]);
     }
 }
 
 #[test]
 fn each_row_of_a_virtual_uno_has_the_plants_of_standard_input() {
     let elf = firmware::build().expect("the firmware builds");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
-    let command = command.args(["virtual-uno", "--rows", "2", "--fast", "--for", "1", "--row", "-", "--elf"]).arg(elf);
-    printed(&typed(command, "position_mm,width_mm,kind\n500,150,plant\n"), 0);
-}
-
-#[test]
-fn a_wrong_file_is_refused_before_the_port_is_opened() {
-    let folder = tempfile::tempdir().expect("there is room for a file");
-    let file = folder.path().join("machine.toml");
-    fs::write(&file, "k = 3\nwheel_mm = 400.5\n").expect("it can be written");
-    let words = ["settings", "push", file.to_str().expect("it is text")];
-    let error = printed(&weeder(&words, Path::new("/dev/no-such-port"), ""), 2);
-    assert!(error.contains("line 2: wheel_mm is `400.5`: it has to be a whole number, 200 to 800 mm"), "{error}");
+    let mut uno = command(&["virtual-uno", "--rows", "2", "--fast", "--for", "1", "--row", "-", "--elf"]);
+    printed(&typed(uno.arg(elf), "position_mm,width_mm,kind\n500,150,plant\n"), 0);
 }
 
 #[test]
@@ -299,8 +282,8 @@ fn the_plain_monitor_answers_line_by_line_and_its_status_shows_errors() {
     assert!(String::from_utf8_lossy(&examples.stdout).starts_with("built_in 0 "), "{examples:?}");
     let beside = String::from_utf8_lossy(&examples.stderr);
     assert_eq!(beside.matches("source number class, and five features").count(), 1, "{beside}");
-    let wrong = printed(&weeder(&["monitor", "--plain"], uno.path(), "h\u{e4}lt\n"), 2);
-    assert!(wrong.contains("is no command: it has to be one line of at most 80 printable ASCII characters"), "{wrong}");
+    let wrong = weeder(&["monitor", "--plain"], uno.path(), "h\u{e4}lt\n");
+    common::assert_fails(&wrong, "is no command: it has to be one line of at most 80 printable ASCII characters");
 }
 
 #[test]
@@ -350,9 +333,7 @@ fn a_session_is_logged_and_replayed() {
     let text = fs::read_to_string(log).expect("it was written");
     assert!(text.starts_with("time_ms,kind,line\n") && text.contains(",event,state is=work\n"), "{text}");
     assert!(text.contains(",event,swing tool=out pos=0\n"), "{text}");
-    let output = Command::new(env!("CARGO_BIN_EXE_weeder")).args(["replay", log]).output().expect("it ends");
-    let replayed = printed(&output, 0);
-    assert!(replayed.contains("0 detections, 0 alarms and 2 swings"), "{replayed}");
+    assert_has(&common::said(folder.path(), &["replay", log]), ["0 detections, 0 alarms and 2 swings"]);
     // An existing log is continued.
     printed(&weeder(&["monitor", "--plain", "--log", log], uno.path(), ""), 0);
     assert_eq!(fs::read_to_string(log).expect("it is there").matches(",connected,").count(), 2);
@@ -361,11 +342,10 @@ fn a_session_is_logged_and_replayed() {
 #[test]
 fn ports_logs_and_recordings_that_do_not_exist_are_named() {
     for words in [&["monitor"][..], &["monitor", "--plain"], &["settings", "pull", "x.toml"]] {
-        let error = printed(&weeder(words, Path::new("/dev/no-such-port"), ""), 2);
-        assert!(error.contains("there is no port /dev/no-such-port: plug the Uno in"), "{error}");
+        let output = weeder(words, Path::new("/dev/no-such-port"), "");
+        common::assert_fails(&output, "there is no port /dev/no-such-port: plug the Uno in");
     }
-    let output = Command::new(env!("CARGO_BIN_EXE_weeder")).args(["replay", "no-such.csv"]).output().expect("it ends");
-    assert!(printed(&output, 2).contains("no-such.csv cannot be read"));
+    common::assert_refused(Path::new("."), &["replay", "no-such.csv"], "no-such.csv cannot be read");
 }
 
 #[cfg(target_os = "linux")]
@@ -381,21 +361,16 @@ fn a_terminated_virtual_uno_removes_its_link() {
         ("-INT", "--ignore-signal=HUP", 1),
         ("-TERM", "--ignore-signal=HUP", 1),
     ] {
-        let mut uno = Command::new("env")
-            .args(["--default-signal", started, env!("CARGO_BIN_EXE_weeder")])
-            .args(["virtual-uno", "--stand", "--bootloader", "optiboot", "--link"])
-            .arg(&link)
-            .stdout(Stdio::piped())
-            .spawn()
-            .expect("cargo has built the command");
-        let mut line = String::new();
-        BufReader::new(uno.stdout.take().expect("it is piped")).read_line(&mut line).expect("it says where it is");
+        let mut uno = Command::new("env");
+        uno.args(["--default-signal", started, env!("CARGO_BIN_EXE_weeder")]);
+        uno.args(["virtual-uno", "--stand", "--bootloader", "optiboot", "--link"]).arg(&link);
+        let (mut uno, line) = Running::with_first_line(&mut uno);
         assert!(link.is_symlink(), "{line}");
-        let status = fs::read_to_string(format!("/proc/{}/status", uno.id())).expect("it runs");
+        let status = fs::read_to_string(format!("/proc/{}/status", uno.0.id())).expect("it runs");
         let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:\t")).expect("Linux lists them");
         assert_eq!(u64::from_str_radix(mask, 16).expect("it is a number") & 1, ignored, "SIGHUP");
-        Command::new("kill").args([signal, &uno.id().to_string()]).status().expect("there is a kill");
-        assert!(uno.wait().expect("it ends").success(), "{signal}");
+        uno.signal(signal);
+        assert!(uno.0.wait().expect("it ends").success(), "{signal}");
         assert!(!link.is_symlink(), "{signal} has left it behind");
     }
 }
@@ -404,26 +379,23 @@ fn a_terminated_virtual_uno_removes_its_link() {
 #[test]
 fn a_recording_survives_an_uno_that_is_unplugged_and_ends_by_ctrl_c() {
     use std::os::unix::fs::symlink;
-    use std::thread::sleep;
-    use std::time::Duration;
 
     let folder = tempfile::tempdir().expect("there is room for a file");
     let (log, port) = (folder.path().join("log.csv"), folder.path().join("uno"));
     let first = uno();
     symlink(first.path(), &port).expect("there is room for a link");
-    let mut weeder = Command::new(env!("CARGO_BIN_EXE_weeder"))
-        .arg("record")
-        .args(["--out".as_ref(), log.as_os_str(), "--port".as_ref(), port.as_os_str()])
-        .stderr(Stdio::null())
-        .spawn()
-        .expect("cargo has built the command");
+    let record = |told: Stdio| {
+        let mut record = command(&["record", "--out"]);
+        Running::start(record.arg(&log).arg("--port").arg(&port).stderr(told))
+    };
+    let weeder = record(Stdio::null());
     // Waits for lines in the log. The test runner has the time limit.
     let wait_for = |what: &str, count: usize| {
         for _ in 0..1200 {
             if fs::read_to_string(&log).is_ok_and(|text| text.matches(what).count() >= count) {
                 return;
             }
-            sleep(Duration::from_millis(50));
+            thread::sleep(Duration::from_millis(50));
         }
         panic!("the log does not show {what} {count} times: {:?}", fs::read_to_string(&log));
     };
@@ -434,26 +406,15 @@ fn a_recording_survives_an_uno_that_is_unplugged_and_ends_by_ctrl_c() {
     fs::remove_file(&port).expect("it is there");
     symlink(second.path(), &port).expect("there is room for a link");
     wait_for(",connected,", 2);
-    let id = weeder.id().to_string();
-    Command::new("kill").args(["-INT", &id]).status().expect("there is a kill");
-    assert_eq!(weeder.wait().expect("it ends").code(), Some(0));
+    weeder.interrupt();
     let text = fs::read_to_string(&log).expect("it is there");
     assert!(text.ends_with('\n'));
     // A continued log counts the new lines and all lines.
-    let words = ["record", "--out", log.to_str().expect("it is text")];
-    let mut weeder = Command::new(env!("CARGO_BIN_EXE_weeder"))
-        .args(words)
-        .arg("--port")
-        .arg(&port)
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("cargo has built the command");
+    let mut weeder = record(Stdio::piped());
     wait_for(",connected,", 3);
-    Command::new("kill").args(["-INT", &weeder.id().to_string()]).status().expect("there is a kill");
-    let mut told = String::new();
-    std::io::Read::read_to_string(&mut weeder.stderr.take().expect("it is piped"), &mut told).expect("it is text");
-    weeder.wait().expect("it ends");
+    weeder.signal("-INT");
+    let told = std::io::read_to_string(weeder.0.stderr.take().expect("it is piped")).expect("it is text");
     let (all, before) = (fs::read_to_string(&log).expect("it is there").lines().count() - 1, text.lines().count() - 1);
     let counted = format!("{} lines were added: {} has {all} now", all - before, log.display());
-    assert!(told.contains(&counted), "{told}");
+    assert_has(&told, [&*counted]);
 }

@@ -11,14 +11,12 @@ const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
 /// Words that hide who acts, or that chain clauses. They are not used.
 const BANNED: [&str; 8] = ["nobody", "whoever", "whatever", "somebody", "anew", "whenever", "of which", "by which"];
 
-/// The longest sentence, in words.
 const SENTENCE: usize = 30;
 
 /// The widest table, and the longest line of help, in characters.
 const TABLE: usize = 110;
 const HELP_LINE: usize = 100;
 
-/// The most words of the README.
 const README: usize = 900;
 
 /// The README, CONTRIBUTING.md, and every page of docs/.

@@ -27,4 +27,3 @@ mod several_rows;
 mod shards;
 mod tables_of_the_manual;
 mod training;
-mod typed;

@@ -6,15 +6,13 @@
 //! answered by `ok`. The lines between must come in that order, at least their beginnings. The virtual Uno rolls where
 //! the reader would roll the machine.
 
+use crate::common::{Running, assert_has, command, printed, told, typed, weeder};
 use field::machine::{Machine, cycle_at};
 use field::motion::Motion;
 use field::row::{Canopy, Row};
 use std::fs;
-use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
-use std::thread;
-use std::time::Duration;
+use std::process::Command;
 use tempfile::TempDir;
 use uno::Uno;
 use uno_run::console::ask;
@@ -42,7 +40,6 @@ const FOREIGN: [&str; 7] = ["avrdude", "cp", "echo", "npm", "scontrol", "squeue"
 /// Subcommands that need neither an Uno nor much time.
 const CHEAP: [&str; 9] = ["classify", "design", "evaluate", "hex", "merge", "plan", "sweep", "train", "trial"];
 
-/// A page of the manual.
 struct Page {
     path: PathBuf,
     text: String,
@@ -60,7 +57,6 @@ fn pages() -> Vec<Page> {
 }
 
 impl Page {
-    /// The lines of each fenced block in this language.
     fn blocks(&self, language: &str) -> Vec<Vec<&str>> {
         let mut blocks = Vec::new();
         let mut lines = self.text.lines();
@@ -120,13 +116,11 @@ fn weeder_arguments(words: &[String]) -> Option<Vec<String>> {
     }
 }
 
-/// Runs `weeder` in a folder. Returns its output if it fails.
+/// Runs `weeder` in a folder. Returns its message if it fails.
 fn complaint(folder: &Path, arguments: &[String]) -> Option<String> {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
-    let output = command.current_dir(folder).args(arguments).output().expect("cargo has built the command");
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let output = weeder(folder, &arguments.iter().map(String::as_str).collect::<Vec<_>>());
     // Status 1 is a finding, and no complaint.
-    (!matches!(output.status.code(), Some(0 | 1))).then_some(said)
+    (!matches!(output.status.code(), Some(0 | 1))).then(|| told(&output))
 }
 
 /// The shell commands of all pages, as words.
@@ -226,7 +220,6 @@ fn commands_in_the_manual_that_need_no_uno_work() {
     }
 }
 
-/// All files in a folder and its subfolders.
 fn files_below(folder: &Path, files: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).expect("it is a folder") {
         let path = entry.expect("it can be read").path();
@@ -352,17 +345,6 @@ fn roll(uno: &mut Uno, distance_mm: f64) {
     uno.run_until(cycle_at(start_cycle, motion.duration_s() + 0.3)).expect("the firmware runs");
 }
 
-/// A program that runs until the test is over.
-struct Running(Child);
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        // It may have ended already; the test has noticed that.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
 #[test]
 fn the_start_without_an_uno_works_to_its_end() {
     firmware::build().expect("the firmware builds");
@@ -378,24 +360,12 @@ fn the_start_without_an_uno_works_to_its_end() {
     let lines: Vec<Vec<String>> = shell_lines().into_iter().filter_map(with_port).collect();
     let [virtual_uno, monitor] = lines.as_slice() else { panic!("first the Uno, then the monitor, not {lines:?}") };
 
-    let weeder = |arguments: &[String]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
-        command.current_dir(folder.path()).args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped());
-        command.spawn().expect("cargo has built the command")
-    };
-    let mut uno = Running(weeder(virtual_uno));
-    while !link.exists() {
-        assert_eq!(uno.0.try_wait().expect("it is a child"), None, "the virtual Uno has ended");
-        thread::sleep(Duration::from_millis(50));
-    }
+    let (_uno, _) = Running::with_first_line(command(&[]).current_dir(folder.path()).args(virtual_uno));
     // A script has no screen.
-    let mut monitor = weeder(&[monitor.as_slice(), &["--plain".to_owned()]].concat());
-    let mut keyboard = monitor.stdin.take().expect("it is piped");
-    keyboard.write_all(b"clear\nhold\nsave\nstatus\n").expect("it listens");
-    drop(keyboard);
-    let output = monitor.wait_with_output().expect("it ends");
-    let said = String::from_utf8_lossy(&output.stdout);
-    assert!(output.status.success() && said.contains("state=hold tool=out"), "{said}");
+    let mut monitor_alone = command(&[]);
+    monitor_alone.current_dir(folder.path()).args(monitor).arg("--plain");
+    let said = printed(&typed(&mut monitor_alone, "clear\nhold\nsave\nstatus\n"), 0);
+    assert_has(&said, ["state=hold tool=out"]);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! `weeder map` with small records.
 
-use crate::common::weeder;
+use crate::common::{assert_has, printed, said, weeder};
 use std::fs;
 
 #[test]
@@ -12,8 +12,8 @@ fn records_with_the_same_file_name_have_their_paths_on_the_map() {
         fs::create_dir_all(log.parent().unwrap()).unwrap();
         fs::write(log, "time_ms,kind,line\n0,connected,0.2.0\n").unwrap();
     }
-    let output = weeder(folder.path(), &[&["map", "-o", "map.geojson", "--json"], &logs[..]].concat());
-    let counted: serde_json::Value = serde_json::from_slice(&output.stdout).expect("it is JSON");
+    let counted = said(folder.path(), &[&["map", "-o", "map.geojson", "--json"], &logs[..]].concat());
+    let counted: serde_json::Value = serde_json::from_str(&counted).expect("it is JSON");
     let names: Vec<&str> = counted.as_array().unwrap().iter().filter_map(|record| record["record"].as_str()).collect();
     assert_eq!(names, ["monday/left.csv", "tuesday/left.csv", "right.csv"]);
 }
@@ -27,8 +27,7 @@ fn advice_differs_for_no_fix_and_for_no_receiver() {
     ] {
         fs::write(folder.path().join("log.csv"), format!("time_ms,kind,line\n{lines}")).unwrap();
         let output = weeder(folder.path(), &["map", "log.csv", "-o", "map.geojson", "--force"]);
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(output.status.success() && said.contains(advice), "{said}");
+        assert_has(&printed(&output, 0), [advice]);
     }
 }
 

@@ -1,11 +1,10 @@
 //! The tools at a machine whose firmware is newer than they are: it has an event, an alarm, settings and words that they do
 //! not know.
 
-use crate::typed::{printed, typed};
+use crate::common::{assert_has, command, printed, typed};
 use control::settings::Setting;
 use std::fs;
 use std::path::PathBuf;
-use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
@@ -76,7 +75,7 @@ impl Newer {
     }
 
     fn weeder(&self, words: &[&str], input: &str) -> std::process::Output {
-        typed(Command::new(env!("CARGO_BIN_EXE_weeder")).args(words).arg("--port").arg(&self.port), input)
+        typed(command(words).arg("--port").arg(&self.port), input)
     }
 }
 
@@ -109,26 +108,24 @@ fn hold_status_and_log_work_with_a_newer_firmware() {
     let log = folder.path().join("log.csv");
     let log_name = log.to_str().expect("it is text");
     let said = printed(&machine.weeder(&["monitor", "--plain", "--log", log_name], "status\nhold\n"), 0);
-    for words in [
+    let parts = [
         "state=hold tool=out",
         "mood=good",
         "tilt deg=4 pos=9",
         "alarm code=9-1 name=boredom pos=9 why=rain",
         "the firmware 99.1.0 (abc) is newer than this program",
         "only the firmware knows wheel_mm, tilt_mm, lamp; the firmware lacks k",
-    ] {
-        assert!(said.contains(words), "{words:?} is not in {said}");
-    }
+    ];
+    assert_has(&said, parts);
     let text = fs::read_to_string(&log).expect("it was written");
-    for line in [
+    let lines = [
         ",setting,wheel_mm=900\n",
         ",setting,tilt_mm=7\n",
         ",event,tilt deg=4 pos=9\n",
         ",event,alarm code=9-1 name=boredom pos=9 why=rain\n",
         ",example,built_in 0 plant 1 2 3 4 5\n",
-    ] {
-        assert!(text.contains(line), "{line:?} is not in {text}");
-    }
+    ];
+    assert_has(&text, lines);
     assert!(!text.contains(",setting,k="), "{text}");
 }
 
@@ -139,10 +136,10 @@ fn settings_of_a_newer_firmware_are_pulled_compared_and_pushed() {
     let file = folder.path().join("machine.toml");
     let name = file.to_str().expect("it is text");
     let pulled = printed(&machine.weeder(&["settings", "pull", name], ""), 0);
-    assert!(pulled.contains("is newer than this program") && pulled.contains("the firmware lacks k"), "{pulled}");
+    assert_has(&pulled, ["is newer than this program", "the firmware lacks k"]);
     let text = fs::read_to_string(&file).expect("it was written");
-    assert!(text.contains("wheel_mm = 900\n") && text.contains("tilt_mm = 7\n"), "{text}");
-    assert!(text.contains("lamp = false\n") && !text.contains("\nk = "), "{text}");
+    assert_has(&text, ["wheel_mm = 900\n", "tilt_mm = 7\n", "lamp = false\n"]);
+    assert!(!text.contains("\nk = "), "{text}");
     let same = printed(&machine.weeder(&["settings", "diff", name], ""), 0);
     assert!(same.starts_with("The machine has the settings of "), "{same}");
     fs::write(&file, "lamp = true\n").expect("it can be written");
@@ -162,8 +159,5 @@ fn settings_of_a_newer_firmware_are_pulled_compared_and_pushed() {
     assert!(gone.contains("k 5 is wanted") && gone.contains("nothing was sent"), "{gone}");
     fs::write(&file, "lmap = true\n").expect("it can be written");
     let unknown = printed(&machine.weeder(&["settings", "push", name], ""), 2);
-    assert!(
-        unknown.contains("line 1: there is no setting `lmap`") && unknown.contains("nothing was sent"),
-        "{unknown}"
-    );
+    assert_has(&unknown, ["line 1: there is no setting `lmap`", "nothing was sent"]);
 }

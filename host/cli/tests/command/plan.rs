@@ -1,12 +1,11 @@
 //! `weeder plan` as a user runs it: its table can be filled in by hand, and `weeder evaluate` evaluates it.
 
-use crate::common::{assert_refused, said};
+use crate::common::{assert_has, assert_refused, said};
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 
-/// The table with every empty cell filled in. Damage and remaining weeds rise with speed. One block is good and one is
-/// bad.
+/// The table with every empty cell filled in. Damage and remaining weeds rise with speed, and blocks differ.
 fn filled_in(table: &str) -> String {
     let fill = |line: &str| {
         let cells: Vec<&str> = line.split(',').collect();
@@ -31,13 +30,12 @@ fn a_plan_filled_in_by_hand_is_evaluated() {
     let empty = fs::read_to_string(&path).unwrap();
     fs::write(&path, filled_in(&empty)).unwrap();
     let words = said(folder.path(), &["evaluate", "trial.csv"]);
-    for line in [
+    let lines = [
         "24 plots of 8 treatments (1, 1.5, 2 and 2.5 km/h; 50 and 60 cm), 3 of each treatment.",
         "Weeding efficiency falls by",
         "│ block",
-    ] {
-        assert!(words.contains(line), "{line:?} is not in\n{words}");
-    }
+    ];
+    assert_has(&words, lines);
 }
 
 #[test]
@@ -53,7 +51,7 @@ fn a_plan_is_refused_while_it_is_empty_and_an_empty_cell_is_named() {
     let (last, _) = filled.rsplit_once(',').unwrap();
     fs::write(&path, format!("{last},\n")).unwrap();
     let words = said(folder.path(), &["evaluate", "trial.csv"]);
-    assert!(words.contains("Plot 24 (no power_hp) takes no part in performance index."), "{words}");
+    assert_has(&words, ["Plot 24 (no power_hp) takes no part in performance index."]);
 }
 
 #[test]

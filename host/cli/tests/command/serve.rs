@@ -4,6 +4,7 @@
 //! 127.0.0.2 stands for the computer's address in the network: every request to it counts as a request from the
 //! network. The tests wait for results, not for fixed times.
 
+use crate::common::{Running, assert_fails, command};
 use serde_json::Value;
 use socket2::{Domain, Socket, Type};
 use std::fs;
@@ -36,10 +37,7 @@ const PATHS: [(&str, &str); 10] = [
 
 #[test]
 fn without_the_code_a_phone_sees_nothing_and_does_nothing() {
-    let folder = folder();
-    let (_uno, port) = uno(&folder, "uno", &["--stand"]);
-    let served = serve(&folder, &[&port], &[]);
-    served.make_ready(0);
+    let (served, _uno) = serve_uno(&[], &[]);
     assert_eq!(served.command(&served.here, "", "start").0, 200);
 
     let (_, http_port) = served.lan.split_once(':').expect("it has a port");
@@ -76,9 +74,7 @@ fn without_the_code_a_phone_sees_nothing_and_does_nothing() {
 
 #[test]
 fn of_a_hundred_wrong_codes_five_are_looked_at_and_the_operator_knows() {
-    let folder = folder();
-    let (_uno, port) = uno(&folder, "uno", &["--stand"]);
-    let served = serve(&folder, &[&port], &[]);
+    let (served, _uno) = serve_uno(&[], &[]);
     let phone = served.pair();
     let statuses: Vec<u16> = (0..100).map(|number| served.try_code(&format!("{number:08}")).0).collect();
     // On a slow PC the minute may end, and five more tries follow.
@@ -94,9 +90,7 @@ fn of_a_hundred_wrong_codes_five_are_looked_at_and_the_operator_knows() {
 
 #[test]
 fn a_foreign_host_or_origin_is_refused_on_every_path_the_events_included() {
-    let folder = folder();
-    let (_uno, port) = uno(&folder, "uno", &["--stand"]);
-    let served = serve(&folder, &[&port], &[]);
+    let (served, _uno) = serve_uno(&[], &[]);
     let phone = served.pair();
     for (door, own) in [(&served.here, ""), (&served.lan, phone.as_str())] {
         let other = if door == &served.here { &served.lan } else { &served.here };
@@ -268,12 +262,8 @@ fn a_pulled_port_is_opened_again_while_the_other_machine_works() {
     let held = |machines: &[bool]| {
         let (status, said) = served.post(&served.lan, "/machines/hold", &phone, "");
         let said: Value = serde_json::from_str(&said).expect("it is JSON");
-        let obeyed: Vec<bool> = said["machines"]
-            .as_array()
-            .expect("it has them")
-            .iter()
-            .map(|machine| machine["error"].is_null())
-            .collect();
+        let answers = said["machines"].as_array().expect("it has them").iter();
+        let obeyed: Vec<bool> = answers.map(|machine| machine["error"].is_null()).collect();
         assert!(status == 200 && obeyed == machines && said["lastMs"].is_u64(), "{status} {said}");
     };
     held(&[true, true]);
@@ -314,9 +304,7 @@ fn an_output_that_takes_nothing_delays_neither_hold_nor_the_end() {
         Command::new("dd").args(fill).env("LC_ALL", "C").stdout(full.try_clone().expect("it is open")).output();
     let said = String::from_utf8_lossy(&filled.expect("there is dd").stderr).into_owned();
     assert!(said.contains("temporarily unavailable"), "it is not full: {said}");
-    let mut command = weeder();
-    command.arg("serve");
-    let served = serve_telling(full.into(), command, &folder, &[&port], &LAN);
+    let served = serve_telling(full.into(), command(&["serve"]), &folder, &[&port], &LAN);
     // The machine's thread has told that it is there.
     served.make_ready(0);
     // The server's thread tells of both.
@@ -346,16 +334,10 @@ fn it_opens_its_page_in_the_browser_where_that_is_asked_for() {
     let (browser, opened) = (folder.path().join("xdg-open"), folder.path().join("opened"));
     fs::write(&browser, format!("#!/bin/sh\necho $1 >{}\n", opened.display())).expect("it can be written to");
     fs::set_permissions(&browser, fs::Permissions::from_mode(0o755)).expect("it is ours");
-    let mut serve = weeder();
-    serve.arg("serve").args(["--http-port", "0", "--open", "--page"]).arg(folder.path().join("page"));
-    serve
-        .env("PATH", format!("{}:/usr/bin:/bin", folder.path().display()))
-        .stdout(Stdio::piped())
-        .stderr(Stdio::null());
-    let mut process = serve.spawn().expect("cargo has built it");
-    let mut line = String::new();
-    BufReader::new(process.stdout.take().expect("it is piped")).read_line(&mut line).expect("it says where it is");
-    let _running = Running(process);
+    let mut serve = command(&["serve", "--http-port", "0", "--open", "--page"]);
+    serve.arg(folder.path().join("page")).stderr(Stdio::null());
+    serve.env("PATH", format!("{}:/usr/bin:/bin", folder.path().display()));
+    let (_running, line) = Running::with_first_line(&mut serve);
     let address = line.split(' ').next().expect("it begins with it");
     let is_opened = || fs::read_to_string(&opened).is_ok_and(|said| said.trim_end() == address);
     let since = Instant::now();
@@ -385,8 +367,6 @@ fn a_failure_to_serve_is_explained_with_a_remedy() {
         (&page, &["--http-port", &taken], "is in use: end the other program, or choose another port by --http-port"),
         (&page, &["--port", "a/uno", "--port", "b/uno"], "two machines are called uno: name them"),
     ] {
-        let output = weeder().arg("serve").arg("--page").arg(page).args(words).output().expect("cargo has built it");
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.code() == Some(2) && said.contains(reason), "{words:?}: {said}");
+        assert_fails(&command(&["serve", "--page"]).arg(page).args(words).output().expect("it ends"), reason);
     }
 }

@@ -3,22 +3,20 @@
 mod alarms;
 mod changes;
 
-use crate::common::said;
-use crate::typed::{printed, typed};
+use crate::common::{Running, assert_has, command, folder_with, printed, said, typed};
 use field::conditions::Conditions;
 use link::settings::{Setting, name};
 use set_up::{ManualStep, Task, steps};
 use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{BufReader, Read, Write};
 use std::path::Path;
-use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::process::{ChildStdin, Stdio};
 use study::experiment::{ControllerKind, Engine, Experiment, Total, totals};
 use tempfile::TempDir;
 use uno::pty::Pty;
 use uno_run::by_the_manual::Novice;
 
-/// The page of the manual.
 const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/set-up.md");
 
 /// Selects the random fields and measurements.
@@ -40,8 +38,7 @@ pub(crate) fn weeded(conditions: &Conditions, replications: u32, seed: u64) -> T
     totals(&experiment.run(&Engine::Native, |_| ()).expect("it can be weeded"))[0]
 }
 
-/// Every machine after any set of these steps in any order. Each step may be the last, so sets that leave steps out are
-/// included.
+/// Every machine after any set of these steps in any order, also with steps left out.
 fn follow_all(
     novice: &Novice,
     rest: &[ManualStep],
@@ -174,7 +171,6 @@ fn the_steps_in_their_order_end_at_the_machine_that_is_set_up() {
     assert!((ours - theirs).abs() < 2.0, "{ours:.1} and {theirs:.1} %: {:?}", novice.conditions.settings);
 }
 
-/// The simulated machine, as on the page.
 pub(crate) fn machine_of_the_page() -> String {
     let page = fs::read_to_string(PAGE).expect("it is there");
     page.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).expect("it has a machine").to_owned()
@@ -182,8 +178,7 @@ pub(crate) fn machine_of_the_page() -> String {
 
 #[test]
 fn the_page_and_the_design_give_the_same_numbers() {
-    let folder = TempDir::new().expect("there is room for a folder");
-    fs::write(folder.path().join("my.toml"), machine_of_the_page()).expect("there is room for a file");
+    let folder = folder_with("my.toml", &machine_of_the_page());
     let printed = said(folder.path(), &["design", "--machine", "my.toml"]);
     // Nothing was measured on this machine, so the margin is the default.
     let set_lines: Vec<&str> = printed.lines().filter(|line| line.starts_with("set ")).collect();
@@ -200,55 +195,43 @@ fn the_page_and_the_design_give_the_same_numbers() {
 
 #[test]
 fn a_file_that_is_another_s_is_not_written_over() {
-    let folder = TempDir::new().expect("there is room for a folder");
-    fs::write(folder.path().join("set-up.txt"), "mine\n").expect("there is room for a file");
-    crate::common::assert_refused(
-        folder.path(),
-        &["set-up", "--port", "/dev/no-such-port"],
-        "set-up.txt is no file of",
-    );
+    let folder = folder_with("set-up.txt", "mine\n");
+    let words = ["set-up", "--port", "/dev/no-such-port", "--state"];
     // Before anything is measured.
-    crate::common::assert_refused(
-        folder.path(),
-        &["set-up", "--state", "no/such.txt", "--port", "/dev/no-such-port"],
-        "no/such.txt cannot be written",
-    );
+    for (file, why) in [("set-up.txt", "is no file of"), ("no/such.txt", "cannot be written")] {
+        crate::common::assert_refused(folder.path(), &[&words[..], &[file]].concat(), &format!("{file} {why}"));
+    }
     assert_eq!(fs::read_to_string(folder.path().join("set-up.txt")).expect("it is there"), "mine\n");
     assert!(!Path::new("set-up.txt").exists());
 }
 
-/// Ends a process with the test.
-pub(crate) struct Ends(Child);
-
-impl Drop for Ends {
-    fn drop(&mut self) {
-        // It may have ended by itself.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-/// Starts `weeder` in a folder, with its input and output.
-fn start(folder: &Path, words: &[&str]) -> (Ends, ChildStdin, BufReader<ChildStdout>) {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
-    let command = command.current_dir(folder).args(words).stdin(Stdio::piped()).stdout(Stdio::piped());
-    let mut child = command.spawn().expect("cargo has built the command");
-    let (input, output) = (child.stdin.take().expect("it is piped"), child.stdout.take().expect("it is piped"));
-    (Ends(child), input, BufReader::new(output))
+/// `weeder` in a folder, with a keyboard.
+fn typing(folder: &Path, words: &[&str]) -> std::process::Command {
+    let mut command = command(words);
+    command.current_dir(folder).stdin(Stdio::piped()).stdout(Stdio::piped());
+    command
 }
 
 /// Starts a virtual Uno, and waits for its port.
-pub(crate) fn uno(folder: &Path, words: &[&str]) -> (Ends, ChildStdin) {
-    let (uno, input, mut output) = start(folder, &[&["virtual-uno"], words].concat());
-    output.read_line(&mut String::new()).expect("it prints its port");
-    (uno, input)
+pub(crate) fn uno(folder: &Path, words: &[&str]) -> (Running, ChildStdin) {
+    let (mut uno, _) = Running::with_first_line(&mut typing(folder, &[&["virtual-uno"], words].concat()));
+    let keyboard = uno.0.stdin.take().expect("it is piped");
+    (uno, keyboard)
+}
+
+/// A folder with a standing virtual Uno at `uno`.
+pub(crate) fn folder_with_uno(words: &[&str]) -> (TempDir, Running) {
+    let folder = TempDir::new().expect("there is room for a folder");
+    let (uno, _) = uno(folder.path(), &[&["--stand", "--link", "uno"], words].concat());
+    (folder, uno)
 }
 
 /// Runs `weeder set-up` to its end. `act` gets each line and each question, and the user's keyboard. Returns the output.
 pub(crate) fn lead(folder: &Path, words: &[&str], mut act: impl FnMut(&str, &mut ChildStdin)) -> String {
-    let (mut guide, mut keyboard, output) = start(folder, &[&["set-up"], words].concat());
+    let mut guide = Running::start(&mut typing(folder, &[&["set-up"], words].concat()));
+    let mut keyboard = guide.0.stdin.take().expect("it is piped");
     let (mut said, mut line) = (String::new(), Vec::new());
-    for byte in output.bytes() {
+    for byte in BufReader::new(guide.0.stdout.take().expect("it is piped")).bytes() {
         line.push(byte.expect("it can be read"));
         if line.ends_with(b"\n") || line.ends_with(b"]: ") {
             let text = String::from_utf8(std::mem::take(&mut line)).expect("it prints text");
@@ -266,8 +249,7 @@ pub(crate) fn type_to(keyboard: &mut ChildStdin, line: impl std::fmt::Display) {
 
 #[test]
 fn without_a_machine_file_set_up_asks_for_its_measures() {
-    let folder = TempDir::new().expect("there is room for a folder");
-    let (_uno, _) = uno(folder.path(), &["--stand", "--link", "uno"]);
+    let (folder, _uno) = folder_with_uno(&[]);
     // Step 2 with a beam that is too near at first, and with an encoder of 500 lines.
     let mut input = vec!["", "s", "", "300", "", "", "400", "2000", "1300", "90", "s"];
     // Step 5 by a person's own measures, one of them out of range at first.
@@ -275,9 +257,7 @@ fn without_a_machine_file_set_up_asks_for_its_measures() {
         "maybe", "", "", "300", "20", "25", "2.5", "0.3", "40", "0.2", "800", "900", "80", "20", "15", "", "", "", "",
         "", "s", "s", "s",
     ]);
-    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
-    command.current_dir(&folder).args(["set-up", "--port", "./uno"]);
-    let printed = printed(&typed(&mut command, input.join("\n") + "\n"), 0);
+    let printed = answered(folder.path(), &input);
     let machine = "[intra_row]\nwidth = \"90 mm\"\nshank_length = \"300 mm\"\nshank_diameter = \"20 mm\"\n\
         blade_base = \"25 mm\"\nblade_height = \"2.5 mm\"\nblade_mass = \"0.3 kg\"\nservo_torque = \"40 kg cm\"\n[swing]\nservo_time_60 = \"0.2 s\"\npulse_for_90 = 800\nprotected = \"80 mm\"\n\
         stem_off = \"20 mm\"\nroom = \"15 mm\"\n";
@@ -287,93 +267,87 @@ fn without_a_machine_file_set_up_asks_for_its_measures() {
         design.lines().filter_map(|line| line.strip_prefix("set ")?.split_once(' ')).collect();
     assert_eq!(lines.len(), 5, "{design}");
     for (setting, value) in lines {
-        assert!(
-            printed
-                .lines()
-                .any(|line| line.contains(&format!("{setting} in ")) && line.contains(&format!("[{value}]: "))),
-            "{setting} {value} is not offered in\n{printed}"
-        );
+        let (name, offer) = (format!("{setting} in "), format!("[{value}]: "));
+        let is_offered = printed.lines().any(|line| line.contains(&name) && line.contains(&offer));
+        assert!(is_offered, "{setting} {value} is not offered in\n{printed}");
     }
-    assert!(printed.contains("it has to be a number from 0 to 200 mm"), "{printed}");
-    assert!(printed.contains("need a beam_to_tool_mm of 389 or more"), "{printed}");
-    assert!(printed.contains("error: type yes or no"), "{printed}");
-    for words in ["four times the encoder's lines", "  ticks_per_rev [2400]: ", "    ticks_per_rev 2000"] {
-        assert!(printed.contains(words), "{words:?} is not in\n{printed}");
-    }
-    for words in ["Open: step 4, Fit a second beam: second_beam_mm is 0", "Open: step 8, Lower the margin: "] {
-        assert!(printed.contains(words), "{words:?} is not in\n{printed}");
-    }
-    assert!(printed.contains("% of the row's ground weeded") && printed.contains("a tool of 90 mm"), "{printed}");
+    let parts = [
+        "it has to be a number from 0 to 200 mm",
+        "need a beam_to_tool_mm of 389 or more",
+        "error: type yes or no",
+        "four times the encoder's lines",
+        "  ticks_per_rev [2400]: ",
+        "    ticks_per_rev 2000",
+        "Open: step 4, Fit a second beam: second_beam_mm is 0",
+        "Open: step 8, Lower the margin: ",
+        "% of the row's ground weeded",
+        "a tool of 90 mm",
+    ];
+    assert_has(&printed, parts);
 }
 
 /// Runs `weeder set-up` on the virtual Uno with these lines. Returns its output.
 fn answered(folder: &Path, lines: &[&str]) -> String {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
-    command.current_dir(folder).args(["set-up", "--port", "./uno"]);
-    printed(&typed(&mut command, lines.join("\n") + "\n"), 0)
+    led_by(folder, &[], lines)
+}
+
+/// The same, with further arguments.
+fn led_by(folder: &Path, words: &[&str], lines: &[&str]) -> String {
+    let words = [&["set-up", "--port", "./uno"], words].concat();
+    printed(&typed(command(&words).current_dir(folder), lines.join("\n") + "\n"), 0)
 }
 
 #[test]
 fn two_timings_by_eye_set_the_safest_times() {
-    let folder = TempDir::new().expect("there is room for a folder");
-    let (_uno, _) = uno(folder.path(), &["--stand", "--fast", "--link", "uno"]);
+    let (folder, _uno) = folder_with_uno(&["--fast"]);
     let to_step_6 = ["s", "s", "s", "s", "s", "off", ""];
     let first = answered(folder.path(), &[&[""][..], &to_step_6, &["190", "50", "", "", "s", "s"]].concat());
-    assert!(first.contains("Open: step 6, Time the servo: time the servo: `calibrate servo` (1 of 2 done)"), "{first}");
+    assert_has(&first, ["Open: step 6, Time the servo: time the servo: `calibrate servo` (1 of 2 done)"]);
     let second = answered(folder.path(), &[&to_step_6[..], &["140", "800", "80", "", "s"]].concat());
     assert!(!second.contains("Open: step 6"), "{second}");
-    for line in ["    lead_out_ms 190 ms\n", "    lead_in_ms 50 ms\n"] {
-        assert!(second.contains(line), "{line:?} is not in\n{second}");
-    }
+    assert_has(&second, ["    lead_out_ms 190 ms\n", "    lead_in_ms 50 ms\n"]);
 }
 
 #[test]
 fn a_lead_that_contradicts_other_settings_is_asked_again() {
-    let folder = TempDir::new().expect("there is room for a folder");
-    let (_uno, _) = uno(folder.path(), &["--stand", "--fast", "--link", "uno"]);
+    let (folder, _uno) = folder_with_uno(&["--fast"]);
     let said = answered(folder.path(), &["", "s", "s", "s", "s", "s", "off", "", "450", "40", "", "550", "q"]);
-    for words in ["together need a beam_to_tool_mm of ", "time the servo: `calibrate servo` (1 of 2 done)"] {
-        assert!(said.contains(words), "{words:?} is not in\n{said}");
-    }
+    assert_has(&said, ["together need a beam_to_tool_mm of ", "time the servo: `calibrate servo` (1 of 2 done)"]);
 }
 
 #[test]
 fn a_near_beam_is_offered_with_a_lower_top_speed() {
-    let folder = TempDir::new().expect("there is room for a folder");
-    let (_uno, _) = uno(folder.path(), &["--stand", "--link", "uno"]);
+    let (folder, _uno) = folder_with_uno(&[]);
     let said = answered(folder.path(), &["", "s", "", "300", "", "", "", "", "", "s", "s", "s", "s", "s", "s"]);
-    assert!(said.contains("beam_to_tool_mm in mm, now 400 [300]: "), "{said}");
-    assert!(said.contains("top_speed_mm_s in mm/s, now 1300 [950]: "), "{said}");
-    assert!(said.contains("    beam_to_tool_mm 300 mm\n") && said.contains("    top_speed_mm_s 950 mm/s\n"), "{said}");
-    assert!(said.contains("  Next, do the open steps: the same command asks for them.\n"), "{said}");
+    let parts = [
+        "beam_to_tool_mm in mm, now 400 [300]: ",
+        "top_speed_mm_s in mm/s, now 1300 [950]: ",
+        "    beam_to_tool_mm 300 mm\n",
+        "    top_speed_mm_s 950 mm/s\n",
+        "  Next, do the open steps: the same command asks for them.\n",
+    ];
+    assert_has(&said, parts);
 }
 
 #[test]
 fn a_call_without_the_machine_s_file_knows_the_machine_of_the_call_before() {
-    let folder = TempDir::new().expect("there is room for a folder");
-    let (_uno, _) = uno(folder.path(), &["--stand", "--link", "uno"]);
+    let (folder, _uno) = folder_with_uno(&[]);
     fs::write(folder.path().join("my.toml"), "[intra_row]\nblade_base = \"60 mm\"\n[swing]\narm_trails = 1\n")
         .expect("there is room for a file");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
-    command.current_dir(&folder).args(["set-up", "--port", "./uno", "--machine", "my.toml"]);
-    printed(&typed(&mut command, "\ns\ns\n\nq\n"), 0);
+    led_by(folder.path(), &["--machine", "my.toml"], &["", "s", "s", "", "q"]);
     answered(folder.path(), &["q"]);
     let kept = fs::read_to_string(folder.path().join("set-up.txt")).expect("it is there");
-    for line in ["machine intra_row.blade_base 60\n", "machine swing.arm_trails 1\n"] {
-        assert!(kept.contains(line), "{line:?} is not in\n{kept}");
-    }
+    assert_has(&kept, ["machine intra_row.blade_base 60\n", "machine swing.arm_trails 1\n"]);
 }
 
 #[test]
 fn a_line_typed_before_a_question_does_not_answer_it() {
-    let folder = TempDir::new().expect("there is room for a folder");
-    let (_uno, _) = uno(folder.path(), &["--stand", "--link", "uno"]);
+    let (folder, _uno) = folder_with_uno(&[]);
     let mut terminal = Pty::open().expect("there is a pseudo terminal");
     let keyboard = File::open(terminal.path()).expect("it is there");
     terminal.write(b"\n\n\n\n").expect("it has room");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
-    command.current_dir(&folder).args(["set-up", "--port", "./uno"]).stdin(keyboard).stdout(Stdio::piped());
-    let mut guide = Ends(command.spawn().expect("cargo has built the command"));
+    let mut guide = command(&["set-up", "--port", "./uno"]);
+    let mut guide = Running::start(guide.current_dir(&folder).stdin(keyboard).stdout(Stdio::piped()));
     let (output, mut said) = (guide.0.stdout.take().expect("it is piped"), String::new());
     for byte in BufReader::new(output).bytes() {
         said.push(char::from(byte.expect("it can be read")));
@@ -387,26 +361,21 @@ fn a_line_typed_before_a_question_does_not_answer_it() {
 
 #[test]
 fn a_lead_that_is_too_long_for_the_beam_is_offered_with_a_lower_top_speed() {
-    let folder = TempDir::new().expect("there is room for a folder");
-    let (_uno, _) = uno(folder.path(), &["--stand", "--link", "uno"]);
+    let (folder, _uno) = folder_with_uno(&[]);
     fs::write(folder.path().join("my.toml"), "weeder.mass = \"60 kg\"\n").expect("there is room for a file");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
-    command.current_dir(&folder).args(["set-up", "--port", "./uno", "--machine", "my.toml"]);
     // Step 5 with the paper's blade: all six offers are taken.
-    let lines = ["", "s", "s", "s", "s", "", "", "", "", "", "", "s", "s", ""].join("\n");
-    let printed = printed(&typed(&mut command, lines), 0);
-    for words in ["top_speed_mm_s in mm/s, now 1300 [", "    lead_out_ms 304 ms\n"] {
-        assert!(printed.contains(words), "{words:?} is not in\n{printed}");
-    }
+    let lines = ["", "s", "s", "s", "s", "", "", "", "", "", "", "s", "s"];
+    let printed = led_by(folder.path(), &["--machine", "my.toml"], &lines);
+    assert_has(&printed, ["top_speed_mm_s in mm/s, now 1300 [", "    lead_out_ms 304 ms\n"]);
     assert!(!printed.contains("error"), "{printed}");
 }
 
 #[test]
 fn a_wheel_that_does_not_turn_is_named_and_the_wait_for_it_can_be_ended() {
-    let folder = TempDir::new().expect("there is room for a folder");
-    let (_uno, _) = uno(folder.path(), &["--stand", "--link", "uno"]);
+    let (folder, _uno) = folder_with_uno(&[]);
     let ended = answered(folder.path(), &["", "s", "s", "s", "s", "s", "s", "", "", "q"]);
-    for words in ["The machine has to roll farther: pos=0 speed_mm_s=0.", "Stopped. The same command continues here."] {
-        assert!(ended.contains(words), "{words:?} is not in\n{ended}");
-    }
+    assert_has(
+        &ended,
+        ["The machine has to roll farther: pos=0 speed_mm_s=0.", "Stopped. The same command continues here."],
+    );
 }

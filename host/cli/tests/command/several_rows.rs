@@ -1,9 +1,9 @@
 //! The host tools with several rows, as a user runs them, with virtual Unos at their ports.
 
-use crate::typed::{printed, typed};
+use crate::common::{Running, command, printed, typed};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Output, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 use tempfile::TempDir;
@@ -37,24 +37,6 @@ fn named(folder: &TempDir, count: usize) -> String {
     file
 }
 
-fn command(words: &[&str]) -> Command {
-    let mut weeder = Command::new(env!("CARGO_BIN_EXE_weeder"));
-    weeder.args(words).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-    weeder
-}
-
-/// A process that is ended with its test.
-struct Running(Child);
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        // It may have ended.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-/// Runs `weeder` with these words and this input.
 fn weeder(words: &[&str], input: &str) -> Output {
     typed(&mut command(words), input)
 }
@@ -154,16 +136,17 @@ fn of_several_rows_the_one_that_is_named_has_the_receiver_in_its_record() {
     let (logs, sentences) = (folder.path().join("field"), sentences.display().to_string());
     let record = |gps: &str| {
         let mut record = command(&["record", "--all", "--rows-file", &file, "--gps", gps, "--out"]);
-        record.arg(&logs).spawn().expect("it is built")
+        record.arg(&logs);
+        record
     };
     for (gps, right) in [
         (sentences.clone(), "with several rows, name the row that records the receiver, as in `--gps left|middle="),
         (format!("right={sentences}"), "there is no row right: there are left, middle"),
     ] {
-        let error = printed(&record(&gps).wait_with_output().expect("it ends"), 2);
+        let error = printed(&record(&gps).output().expect("it ends"), 2);
         assert!(error.contains(right) && !logs.exists(), "{error}");
     }
-    let mut recording = Running(record(&format!("middle={sentences}")));
+    let mut recording = Running::start(record(&format!("middle={sentences}")).stderr(Stdio::null()));
     let text = |name: &str| fs::read_to_string(logs.join(format!("{name}.csv"))).unwrap_or_default();
     let ends = || text("middle").matches("the file ends here").count();
     let is_written = || text("middle").contains(",gps,") && ends() > 0 && text("left").contains(",status,");
@@ -171,8 +154,7 @@ fn of_several_rows_the_one_that_is_named_has_the_receiver_in_its_record() {
         assert_eq!(recording.0.try_wait().expect("it is a child"), None, "it goes on");
         sleep(Duration::from_millis(50));
     }
-    Command::new("kill").args(["-INT", &recording.0.id().to_string()]).status().expect("there is a kill");
-    assert!(recording.0.wait().expect("it ends").success());
+    recording.interrupt();
     assert!(text("middle").contains(",antenna,") && !text("left").contains("gps"), "{}", text("left"));
     assert_eq!(ends(), 1, "{}", text("middle"));
 }
@@ -209,8 +191,8 @@ fn each_row_has_its_own_log_and_a_replugged_row_is_only_in_its_own() {
     while port(&folder, 2).exists() {
         sleep(Duration::from_millis(10));
     }
-    let weeder = command(&["record", "--out", out, "--all", "--rows-file", &file]).spawn().expect("it is built");
-    let mut weeder = Running(weeder);
+    let mut weeder = command(&["record", "--out", out, "--all", "--rows-file", &file]);
+    let mut weeder = Running::start(weeder.stderr(Stdio::piped()));
     let text = |name: &str| fs::read_to_string(logs.join(format!("{name}.csv"))).unwrap_or_default();
     // Waits for lines in a log. The test runner has the time limit.
     let wait_for = |name: &str, what: &str, count: usize| {
@@ -232,16 +214,15 @@ fn each_row_has_its_own_log_and_a_replugged_row_is_only_in_its_own() {
     wait_for("left", ",lost,the port is gone", 1);
     machine.happen(0, Mishap::PluggedIn);
     wait_for("left", ",connected,", 2);
-    Command::new("kill").args(["-INT", &weeder.0.id().to_string()]).status().expect("there is a kill");
-    let mut told = String::new();
-    std::io::Read::read_to_string(&mut weeder.0.stderr.take().expect("it is piped"), &mut told).expect("it is text");
+    weeder.signal("-INT");
+    let told = std::io::read_to_string(weeder.0.stderr.take().expect("it is piped")).expect("it is text");
     assert_eq!(weeder.0.wait().expect("it ends").code(), Some(0), "{told}");
     assert!(told.contains("left: the port is gone") && !told.contains("middle: the port"), "{told}");
     assert!(!text("middle").contains(",lost,") && text("middle").matches(",connected,").count() == 1);
     for name in ["left", "middle", "right"] {
         assert!(told.contains(&format!("{name}.csv has ")), "{told}");
         let log = logs.join(format!("{name}.csv"));
-        let replayed = Command::new(env!("CARGO_BIN_EXE_weeder")).arg("replay").arg(&log).output().expect("it ends");
-        assert!(matches!(replayed.status.code(), Some(0 | 1)), "{}", String::from_utf8_lossy(&replayed.stderr));
+        let replayed = command(&["replay"]).arg(&log).output().expect("it ends");
+        assert!(matches!(replayed.status.code(), Some(0 | 1)), "{replayed:?}");
     }
 }

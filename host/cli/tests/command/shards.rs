@@ -1,23 +1,18 @@
 //! `--shard` and `weeder merge`: the merged parts of a study equal the undivided study byte by byte. Incomplete studies
 //! are refused.
 
-use crate::common::{SMALL, assert_refused, said, weeder};
+use crate::common::{Running, SMALL, assert_refused, command, folder_with, said, told, typed, weeder};
 use model_test::is_thorough;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Stdio};
 use std::thread;
 use std::time::Duration;
 use tempfile::TempDir;
 
-/// A trial in it.
 const TRIAL: [&str; 5] = ["trial", "--field", "small.toml", "--seed", "7"];
 
-/// A folder with the file `small.toml`.
 fn folder() -> TempDir {
-    let folder = TempDir::new().unwrap();
-    fs::write(folder.path().join("small.toml"), SMALL).unwrap();
-    folder
+    folder_with("small.toml", SMALL)
 }
 
 /// Computes a study in `of` shards, each to the part `I.part`, the last one first.
@@ -40,7 +35,7 @@ fn assert_same(study: &[&str], shown: &[&str], files: &[&str]) {
     });
     let parts = ["merge", "3.part", "1.part", "4.part", "2.part"];
     let output = weeder(merged.path(), &[&parts[..], shown].concat());
-    assert_eq!(output.status.code(), expected.status.code(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(output.status.code(), expected.status.code(), "{}", told(&output));
     assert!(!output.stdout.is_empty());
     assert_eq!(String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&expected.stdout));
     for file in files {
@@ -78,12 +73,9 @@ fn a_part_that_comes_through_a_pipe_is_merged() {
     let folder = folder();
     let trial = [&TRIAL[..], &["--speeds", "1", "--spacings", "50"]].concat();
     compute_parts(folder.path(), &trial, 2);
-    let mut merge = Command::new(env!("CARGO_BIN_EXE_weeder"));
-    merge.current_dir(folder.path()).args(["merge", "/dev/stdin", "2.part"]);
-    let mut cat = Command::new("cat").arg(folder.path().join("1.part")).stdout(Stdio::piped()).spawn().unwrap();
-    let merged = merge.stdin(cat.stdout.take().expect("it is piped")).output().unwrap();
-    cat.wait().unwrap();
-    assert_eq!(merged.stdout, weeder(folder.path(), &trial).stdout, "{}", String::from_utf8_lossy(&merged.stderr));
+    let part = fs::read(folder.path().join("1.part")).unwrap();
+    let merged = typed(command(&["merge", "/dev/stdin", "2.part"]).current_dir(folder.path()), part);
+    assert_eq!(merged.stdout, weeder(folder.path(), &trial).stdout, "{}", told(&merged));
 }
 
 #[test]
@@ -170,13 +162,11 @@ fn a_killed_shard_leaves_no_file_and_can_be_restarted() {
     let folder = folder();
     let path = folder.path();
     let endless = ["soak", "--hours", "10000", "--uno-minutes", "0", "--shard", "1/2", "--out", "1.part"];
-    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
-    let mut shard = command.current_dir(path).args(endless).spawn().expect("cargo has built the command");
+    let mut shard = Running::start(command(&endless).current_dir(path));
     // At any progress: it would take hours.
     thread::sleep(Duration::from_millis(500));
-    assert!(shard.try_wait().unwrap().is_none(), "it computes");
-    shard.kill().unwrap();
-    shard.wait().unwrap();
+    assert!(shard.0.try_wait().unwrap().is_none(), "it computes");
+    drop(shard);
     let left: Vec<_> = fs::read_dir(path).unwrap().map(|entry| entry.unwrap().file_name()).collect();
     assert_eq!(left, ["small.toml"]);
 

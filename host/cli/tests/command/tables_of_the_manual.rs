@@ -27,7 +27,6 @@ fn with_part(page: &ExpectFile, name: &str, part: &str) -> String {
     [before, &begin, "\n", part, "\n", &end, after].concat()
 }
 
-/// All events, and their values.
 fn events() -> String {
     let mut table = "| event | value | meaning |\n| --- | --- | --- |\n".to_owned();
     for LineDescription { meaning, beginning, values, .. } in EVENTS {
@@ -52,7 +51,6 @@ fn key(value: &ValueDescription) -> String {
     format!("`{}={words}`", value.key)
 }
 
-/// The answer to `status`.
 fn status() -> String {
     let table = |line: &LineDescription| {
         let rows = line.values.iter().map(|value| format!("| {} | {} |\n", key(value), value.meaning));
@@ -63,7 +61,6 @@ fn status() -> String {
     STATUS.iter().map(table).collect::<Vec<_>>().join("\n")
 }
 
-/// The texts of a drawing, each with its x and y.
 fn texts(drawing: &str) -> Vec<(f64, f64, String)> {
     let mut texts = Vec::new();
     let mut place = None;

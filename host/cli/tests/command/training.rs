@@ -1,20 +1,17 @@
 //! `weeder train` and `weeder classify`, as they are called.
 
-use crate::common::{assert_refused, said, weeder};
+use crate::common::{self, assert_has, assert_refused, printed, said, told, weeder};
 use std::fs;
 use study::training::MOST_EXAMPLES;
 use tempfile::TempDir;
 
-/// The table that the firmware is built from.
 const BUILT_IN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../control/src/ground/examples/table.rs");
 
 const HEADER: &str = "speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,label\n";
 
 /// A folder with the file `objects.csv`, of these lines below the header.
 fn folder_with(lines: &str) -> TempDir {
-    let folder = TempDir::new().unwrap();
-    fs::write(folder.path().join("objects.csv"), format!("{HEADER}{lines}")).unwrap();
-    folder
+    common::folder_with("objects.csv", &format!("{HEADER}{lines}"))
 }
 
 /// Asserts that these objects and arguments are refused with these words.
@@ -41,17 +38,14 @@ fn the_built_in_table_is_the_command_s_output() {
 fn examples_written_as_csv_are_known_to_the_firmware() {
     let folder = TempDir::new().unwrap();
     said(folder.path(), &["train", "--synthetic", "--out", "examples.csv"]);
-    let said = said(folder.path(), &["classify", "examples.csv"]);
-    assert!(said.contains("Treated as they should       100.00 % of all"), "{said}");
+    assert_has(&said(folder.path(), &["classify", "examples.csv"]), ["Treated as they should       100.00 % of all"]);
 }
 
 #[test]
 fn a_table_of_no_examples_says_why() {
     let folder = TempDir::new().unwrap();
     let output = weeder(folder.path(), &["train", "--synthetic", "--beside", "--out", "none.csv"]);
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{message}");
-    assert!(message.contains("none.csv has no example: none improves the built-in table"), "{message}");
+    assert_has(&printed(&output, 0), ["none.csv has no example: none improves the built-in table"]);
     assert_eq!(fs::read_to_string(folder.path().join("none.csv")).unwrap(), HEADER);
 }
 
@@ -59,10 +53,8 @@ fn a_table_of_no_examples_says_why() {
 fn a_plant_that_would_be_cut_ends_with_status_1() {
     // A plant as narrow as a weed.
     let folder = folder_with("694,300,226,116,439,plant\n694,500,226,250,573,plant\n");
-    let output = weeder(folder.path(), &["classify", "objects.csv"]);
-    let said = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert_eq!(output.status.code(), Some(1), "{said}");
-    assert!(said.contains("Plants classified as weeds   1 of 2, 50.00 %"), "{said}");
+    let said = printed(&weeder(folder.path(), &["classify", "objects.csv"]), 1);
+    assert_has(&said, ["Plants classified as weeds   1 of 2, 50.00 %"]);
 }
 
 #[test]
@@ -79,10 +71,8 @@ fn answers_are_printed_as_json_for_scripts() {
 #[test]
 fn objects_without_labels_are_classified_without_a_score() {
     let folder = folder_with("694,300,226,116,439,\n");
-    let output = weeder(folder.path(), &["classify", "objects.csv"]);
-    let said = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert_eq!(output.status.code(), Some(0), "{said}");
-    assert!(said.contains("weed") && said.contains("known"), "{said}");
+    let said = said(folder.path(), &["classify", "objects.csv"]);
+    assert_has(&said, ["weed", "known"]);
     assert!(!said.contains("classified as"), "{said}");
 }
 
@@ -116,9 +106,8 @@ fn a_k_that_is_not_the_machine_s_default_is_told() {
     let detection = |n: i32| format!("556,50{n},250,250,578,plant\n556,30{n},250,116,444,weed\n");
     let folder = folder_with(&[0, 1, 2].map(detection).concat());
     for (k, is_told) in [("1", true), ("3", false)] {
-        let output = weeder(folder.path(), &["train", "objects.csv", "--k", k]);
-        let told = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success() && told.contains("`set k 1`, then `save`") == is_told, "{told}");
+        let said = printed(&weeder(folder.path(), &["train", "objects.csv", "--k", k]), 0);
+        assert_eq!(said.contains("`set k 1`, then `save`"), is_told, "{said}");
     }
 }
 
@@ -131,16 +120,14 @@ fn detections_that_dumps_repeat_count_once() {
     };
     let dump = |from: i32| (from..from + 6).map(|number| detection(number % 8)).collect::<String>();
     let folder = folder_with(&[dump(0), dump(2), dump(4), dump(6)].concat());
-    let output = weeder(folder.path(), &["train", "objects.csv"]);
-    let [said, told] = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text).into_owned());
-    assert!(said.starts_with("Detections  8\n"), "{said}");
-    assert!(told.contains("Passed over 16 that repeat another line") && !told.contains("both labels"), "{told}");
+    let said = printed(&weeder(folder.path(), &["train", "objects.csv"]), 0);
+    assert!(said.starts_with("Detections  8\n") && !said.contains("both labels"), "{said}");
+    assert_has(&said, ["Passed over 16 that repeat another line"]);
     fs::write(folder.path().join("relabelled.csv"), HEADER.to_owned() + &detection(2).replace("plant", "weed"))
         .unwrap();
     let output = weeder(folder.path(), &["train", "objects.csv", "relabelled.csv"]);
-    let told = String::from_utf8_lossy(&output.stderr);
     let said = "Learned 1 with both labels, such as relabelled.csv, line 2: an earlier line has it as a plant";
-    assert!(told.contains(said), "{told}");
+    assert_has(&told(&output), [said]);
 }
 
 #[test]
@@ -154,11 +141,8 @@ fn training_reports_newly_unknown_plants_and_changed_answers() {
     let folder = TempDir::new().unwrap();
     let lines: String = (0..24).map(detection).collect();
     fs::write(folder.path().join("objects.csv"), HEADER.replace("label", "answer,label") + &lines).unwrap();
-    let output = weeder(folder.path(), &["train", "objects.csv", "--k", "3", "--max", "5"]);
-    let told = String::from_utf8_lossy(&output.stderr);
-    for said in ["With the table, 12 more plants are unknown", "The machine classified 12 of 24 otherwise"] {
-        assert!(output.status.success() && told.contains(said), "{told}");
-    }
+    let said = printed(&weeder(folder.path(), &["train", "objects.csv", "--k", "3", "--max", "5"]), 0);
+    assert_has(&said, ["With the table, 12 more plants are unknown", "The machine classified 12 of 24 otherwise"]);
 }
 
 #[test]
@@ -172,37 +156,19 @@ fn a_training_that_takes_long_is_told() {
 #[test]
 fn a_class_that_no_detection_has_gets_no_share() {
     let folder = folder_with("694,300,226,116,439,weed\n");
-    let output = weeder(folder.path(), &["classify", "objects.csv"]);
-    let said = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(said.contains("Plants classified as weeds   0 of 0, \u{2013}"), "{said}");
-    assert!(said.contains("Weeds left standing          0 of 1, 0.00 %"), "{said}");
+    let said = said(folder.path(), &["classify", "objects.csv"]);
+    assert_has(&said, ["Plants classified as weeds   0 of 0, \u{2013}", "Weeds left standing          0 of 1, 0.00 %"]);
 }
 
 #[test]
-fn a_table_that_teaches_nothing_is_refused_with_file_and_line() {
-    let train = ["train", "objects.csv"];
-    assert_not_taken("", &train, "objects.csv, line 1: no line is below the header");
-    assert_not_taken("694,500,226,250,573,plant\n", &train, "objects.csv, line 2: up to here there is no label weed");
-    assert_not_taken("694,500,NaN,250,573,plant\n", &train, "objects.csv, line 2: delay_mm is `NaN`");
-}
-
-#[test]
-fn a_k_that_cannot_vote_is_refused() {
-    assert_not_taken("", &["train", "--synthetic", "--k", "16"], "it has to be auto or a number from 1 to 15");
-    assert_not_taken("", &["classify", "objects.csv", "--k", "0"], "it has to be a whole number from 1 to 15");
-}
-
-#[test]
-fn a_table_is_written_as_rust_or_csv_only() {
-    assert_not_taken(
-        "",
-        &["train", "--synthetic", "--out", "table.txt"],
-        "a table is written as Rust (.rs) or as CSV (.csv)",
-    );
-}
-
-#[test]
-fn objects_come_from_files_or_from_the_simulated_field() {
-    assert_not_taken("", &["train"], "<FILE.csv|--synthetic>");
-    assert_not_taken("", &["train", "objects.csv", "--synthetic"], "cannot be used with");
+fn wrong_options_of_a_training_are_refused() {
+    for (words, why) in [
+        ("train --synthetic --k 16", "it has to be auto or a number from 1 to 15"),
+        ("classify objects.csv --k 0", "it has to be a whole number from 1 to 15"),
+        ("train --synthetic --out table.txt", "a table is written as Rust (.rs) or as CSV (.csv)"),
+        ("train", "<FILE.csv|--synthetic>"),
+        ("train objects.csv --synthetic", "cannot be used with"),
+    ] {
+        assert_not_taken("", &words.split(' ').collect::<Vec<_>>(), why);
+    }
 }

@@ -54,7 +54,6 @@ impl From<Arm> for f64 {
     }
 }
 
-/// The words for the values of a kind.
 trait Words {
     const WORDS: &'static [&'static str] = &[];
 }

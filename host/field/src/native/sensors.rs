@@ -6,11 +6,9 @@ use crate::pass::Pass;
 use crate::wiring;
 use rig::Beams;
 
-/// The readings of the machine's sensors, turn by turn: the encoder's count, and the beams' edges since the turn
-/// before.
+/// The readings of the sensors, turn by turn: the encoder's count, and the beams' edges since the turn before.
 ///
-/// They do not depend on the firmware: every controller of the same row with the same machine and motion gets the same
-/// readings.
+/// They do not depend on the firmware: each controller gets the same ones for the same row, machine and motion.
 pub struct Sensors {
     turn_s: f64,
     /// The encoder's count in each turn.

@@ -42,7 +42,6 @@ impl<'a> Why<'a> {
         }
     }
 
-    /// The reasons, to the end of the pass.
     pub(super) fn into_reasons(self) -> Vec<Reason> {
         self.reasons.until(self.pass.motion.duration_s())
     }

@@ -22,7 +22,6 @@ pub(super) struct Rolled {
     pub(super) line: u64,
 }
 
-/// A stretch while it is read.
 #[derive(Default)]
 pub(super) struct Reading {
     pub(super) wheel: Vec<Rolled>,
@@ -47,7 +46,6 @@ impl Reading {
         is_gap(to.time_ms - from.time_ms, to.m - from.m)
     }
 
-    /// The marks of all gaps.
     pub(super) fn gaps(&self) -> impl Iterator<Item = Event> {
         let gaps = self.wheel.windows(2).filter(|pair| Self::is_gap(&pair[0], &pair[1]));
         gaps.map(|pair| {
@@ -127,8 +125,7 @@ impl Reading {
         if is_next_row {
             self.row_from = self.events.len();
         } else {
-            // A swing is reported somewhat later than it is commanded, and perhaps after a status with a farther
-            // position.
+            // A swing is reported somewhat later than it is commanded, perhaps after a status with a farther position.
             at_m = at_m.max(passed.distance_m.start);
             passed.distance_m.end = at_m;
         }
@@ -198,7 +195,6 @@ impl Reading {
     }
 }
 
-/// The work that a status shows.
 fn shown(status: &Status) -> Did {
     match (status.mode, status.tool_out) {
         (Mode::Work, false) => Did::Weeded,
@@ -221,7 +217,6 @@ fn restarted(lines: &[Entry]) -> Option<String> {
     has_restarted.then(|| format!("restarted{cause} while at work: not weeded from here"))
 }
 
-/// The reset's cause in a line, such as the greeting.
 fn reset_cause(line: &str) -> Option<&str> {
     let (_, rest) = line.split_once("reset by ")?;
     rest.split(|letter: char| !(letter.is_alphanumeric() || letter == '_')).next().filter(|cause| !cause.is_empty())

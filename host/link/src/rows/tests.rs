@@ -20,7 +20,6 @@ fn answers(heard: &Heard, row: usize, line: &str) -> bool {
     matches!(&heard.what, What::Happened(Happening::Answered { command, .. }) if heard.row == row && command == line)
 }
 
-/// Whether this line was typed.
 fn types(heard: &Heard, line: &str) -> bool {
     matches!(&heard.what, What::Happened(Happening::Command(typed)) if typed == line)
 }

@@ -8,7 +8,6 @@ use serde_json::{Value, json};
 /// Warnings that the answer to `status` does not name. They last until the machine holds.
 pub(super) const UNTIL_HOLD: [Warning; 2] = [Warning::LateCommand, Warning::SlipUnknown];
 
-/// The warning that a line of the answer to `status` names.
 pub(super) fn named_warning(line: &str) -> Option<Warning> {
     Values(line).text("warning").and_then(|name| Warning::find(name.as_bytes()))
 }

@@ -28,7 +28,6 @@ struct Talk {
 }
 
 impl Talk {
-    /// A connection that waits for a board.
     fn waiting(board: ScriptedBoard) -> Self {
         let (port, opened) = (board.clone(), Rc::new(Cell::new(0)));
         let count = Rc::clone(&opened);

@@ -55,7 +55,6 @@ impl<'a> ReplayClassifier<'a> {
         Self { nearest, seen: Cell::default(), speeds_mm_s: Cell::default(), described: RefCell::default() }
     }
 
-    /// The possible speed classes of the machine.
     fn speed_classes(&self) -> impl Iterator<Item = i16> {
         let class = |speed: i32| features::speed_class(speed.clamp(i16::MIN.into(), i16::MAX.into()) as i16);
         let (slowest, fastest) = self.speeds_mm_s.get();

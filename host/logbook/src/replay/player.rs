@@ -272,7 +272,6 @@ impl<'a> Player<'a> {
         }
     }
 
-    /// The settings in use.
     pub(super) fn settings(&self) -> &Settings {
         self.rig.settings()
     }

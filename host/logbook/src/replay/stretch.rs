@@ -269,7 +269,6 @@ impl<'a> Stretch<'a> {
         change.and_then(|change| self.swing_of_change(change)).is_some_and(|(index, _)| index == place)
     }
 
-    /// The next status after an index.
     pub(super) fn next_status(&self, place: usize) -> Option<&Status> {
         self.happened[place..].iter().find_map(status)
     }
@@ -283,7 +282,6 @@ fn unseen_at_begin_mm(settings: &Settings) -> u16 {
     to_beam_mm + margin_mm + zone_mm / 2
 }
 
-/// Whether it is a change of state.
 fn is_change((_, happened): &(&Entry, Happened)) -> bool {
     matches!(happened, Happened::Event(EventLine::State { .. }))
 }
@@ -297,7 +295,6 @@ fn swing_or_status((_, happened): &(&Entry, Happened)) -> Option<(i32, bool)> {
     }
 }
 
-/// The status in a line of the log.
 fn status<'a>((_, happened): &'a (&Entry, Happened)) -> Option<&'a Status> {
     if let Happened::Status(status) = happened { Some(status) } else { None }
 }

@@ -18,7 +18,6 @@ use std::task::{Context, Poll, Waker};
 use tokio::runtime;
 use tokio::sync::broadcast;
 
-/// Time of a step.
 const STEP_MS: u64 = 50;
 /// Steps in which pages and network do what they like.
 const STEPS: u64 = 160;

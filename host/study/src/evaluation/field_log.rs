@@ -131,7 +131,6 @@ pub fn join(records: &mut [PlotRecord], stretches: &[Worked], plots: &[u32]) -> 
     Ok(joined)
 }
 
-/// The stretches, in a line.
 fn list(stretches: &[Worked]) -> String {
     let line = |(number, worked): (usize, &Worked)| {
         let Worked { lines, time_ms, distance_mm, .. } = worked;

@@ -67,7 +67,6 @@ impl Analysis {
         ))
     }
 
-    /// An offer of nominal speeds.
     fn speeds_as_measured(&self) -> Option<String> {
         // Nominal speeds that were given are not guessed again.
         if self.records.iter().zip(&self.levels_km_h).any(|(record, level)| record.speed_km_h != *level) {
@@ -100,7 +99,6 @@ impl Analysis {
         )
     }
 
-    /// The damage, and the plots with most of it.
     fn damage_in_words(&self) -> String {
         let share = self.damage();
         let Share { count, of, .. } = share;
@@ -231,7 +229,6 @@ fn effect(term: &Term, response: Response, name: &str, unit: &str) -> String {
     format!("{verb} by {}{measure} for each {unit}{significance}", visible(term.estimate.abs(), 3))
 }
 
-/// What a plot lacks.
 fn lacking(record: &PlotRecord) -> Vec<String> {
     let is_missing = |(_, value): &(&str, String)| value.is_empty();
     let missing = record.columns().filter(is_missing).map(|(column, _)| format!("no {column}"));

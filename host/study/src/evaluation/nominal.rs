@@ -8,7 +8,6 @@ use crate::statistics::grouped;
 use crate::table::{distinct, list};
 use anyhow::{Result, ensure};
 
-/// Steps between nominal speeds, km/h.
 const STEPS_KM_H: [f64; 5] = [1.0, 0.5, 0.25, 0.2, 0.1];
 
 /// The greatest error of a measured speed, as a share of the step.

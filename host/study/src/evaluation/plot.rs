@@ -45,7 +45,6 @@ pub struct PlotRecord {
 /// in a plot. `None` prints all decimals.
 type Column = (&'static str, &'static str, Option<usize>, (f64, f64), fn(&PlotRecord) -> Option<f64>);
 
-/// The range of a count.
 const COUNT: (f64, f64) = (0.0, f64::INFINITY);
 
 /// The columns of a table of plots, which carry their units. The plots of every simulated field are in the ranges.
@@ -110,7 +109,6 @@ impl PlotRecord {
         })
     }
 
-    /// The cells of a report.
     pub(super) fn cells(&self) -> Vec<String> {
         let shown = |decimals: Option<usize>, value| decimals.map_or_else(|| short(value), |some| fixed(value, some));
         COLUMNS.map(|(_, _, decimals, _, value)| optional(value(self), |value| shown(decimals, value))).to_vec()
@@ -245,7 +243,6 @@ impl Response {
 /// Texts of a cell that say that a count or measurement was not made.
 const NOT_COUNTED: [&str; 8] = ["", "na", "n/a", "n.a.", "-", "\u{2013}", "?", "."];
 
-/// Parses a whole number.
 pub(super) fn whole(line: Line, column: &str) -> Result<u32, FileError> {
     line.value(column, "a whole number, 0 or more")
 }

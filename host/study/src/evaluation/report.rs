@@ -78,7 +78,6 @@ fn measures(of: &Performance) -> [String; MEASURES.len()] {
 }
 
 impl Analysis {
-    /// The means by treatment.
     pub(crate) fn means(&self) -> Table {
         let [_, others @ ..] = MEASURES.map(|(heading, ..)| heading);
         let columns = ["treatment", "plots", "plant damage of all plants, %"].into_iter().chain(others);
@@ -99,7 +98,6 @@ impl Analysis {
         table
     }
 
-    /// Each plot: its record and its measures.
     pub(crate) fn plots(&self) -> Table {
         let counted = COLUMNS.map(|(_, heading, ..)| heading);
         let columns = ["plot"].into_iter().chain(counted).chain(MEASURES.map(|(heading, ..)| heading));

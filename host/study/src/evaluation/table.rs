@@ -9,7 +9,6 @@ use files::csv_table::{CsvTable, Line};
 use std::collections::HashSet;
 use std::path::Path;
 
-/// How to leave a plot out of an evaluation.
 pub(super) const LEAVE_OUT: &str = "to leave a plot out, put # in front of its line";
 
 /// Reads the plots of a trial. A cell of a count or a measurement may be empty: the plot then takes part in what it has.
@@ -55,7 +54,6 @@ mod tests {
         "replication,speed_km_h,spacing_cm,weeds_before,weeds_after,plants,damaged,area_m2,time_s,width_m,power_hp\n";
     const LINE: &str = "1,1.5,50,200,30,50,1,24,180,0.4,2.5\n";
 
-    /// The plots of a table with this text, or the error.
     fn read(text: &str) -> Result<Vec<PlotRecord>, String> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("trial.csv");

@@ -127,7 +127,6 @@ fn against_speed(title: &str, unit: &str, lines: impl IntoIterator<Item = String
     format!("{title} in {unit} against speed.{}", lines.into_iter().collect::<String>())
 }
 
-/// A line in words.
 fn said(Series { name, line, .. }: &Series) -> String {
     let points: Vec<String> = line.iter().map(|(x, y)| format!("{} at {} km/h", visible(*y, 1), short(*x))).collect();
     format!(" {name}: {}.", points.join(", "))

@@ -79,7 +79,6 @@ impl Design {
 /// A model's column: its name, and its value in each plot.
 pub(super) type Column = (&'static str, Vec<f64>);
 
-/// The directions of a model's columns.
 pub(super) fn basis(columns: &[Column]) -> Result<Basis, NoModel> {
     let values: Vec<&[f64]> = columns.iter().map(|(_, values)| values.as_slice()).collect();
     Basis::of(&values).ok_or(NoModel::NotSolved)
@@ -88,49 +87,26 @@ pub(super) fn basis(columns: &[Column]) -> Result<Basis, NoModel> {
 /// The plots carry no model.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
+#[expect(missing_docs, reason = "the messages say what each means")]
 pub enum NoModel {
-    /// The response does not vary.
     #[error("it is {} in every plot that has it: speed and spacing explain nothing", crate::table::short(*.value))]
-    Constant {
-        /// Its value everywhere.
-        value: f64,
-    },
-    /// No factor varies.
+    Constant { value: f64 },
     #[error("all plots with this measure have the same speed and spacing: a model needs two levels of one of them")]
     OneTreatment,
-    /// There are too few degrees of freedom left for the scatter.
     #[error("plots: {plots}, parameters: {parameters}: this model takes at least {needed} plots")]
-    TooFewPlots {
-        /// The plots that there are.
-        plots: usize,
-        /// The number of parameters.
-        parameters: usize,
-        /// The plots that it takes.
-        needed: usize,
-    },
-    /// The calculation would take minutes.
+    TooFewPlots { plots: usize, parameters: usize, needed: usize },
     #[error(
         "speeds and spacings make {treatments} treatments, and the analysis takes at most {most}: give measured speeds their nominal ones (`weeder evaluate --speeds`)"
     )]
-    TooManyTreatments {
-        /// The treatments that there are.
-        treatments: usize,
-        /// The most that it takes.
-        most: usize,
-    },
-    /// Speed and spacing go together.
+    TooManyTreatments { treatments: usize, most: usize },
     #[error("speed and spacing change together, so their effects cannot be separated")]
     Inseparable,
-    /// Nothing counts: no plant as damaged, or no weed as gone.
     #[error("no plant of any plot is damaged, or no weed gone: speed and spacing explain nothing")]
     NothingCounted,
-    /// A binomial model's slope diverges.
     #[error("all that was counted lies on one side of the speeds or spacings, so the odds have no finite slope")]
     OneSided,
-    /// An iteration ended without a result.
     #[error("the calculation did not converge; this is no statement about the plots")]
     NotSolved,
-    /// No plot has the measure.
     #[error("no plot has it: something that it needs is 0, or was not counted or measured")]
     NotMeasured,
 }
@@ -138,38 +114,28 @@ pub enum NoModel {
 /// A remark on a table of figures.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
+#[expect(missing_docs, reason = "the messages say what each means")]
 pub enum Remark {
-    /// Speed is no term.
     #[error("all plots with this measure have the same speed, so that speed is left out")]
     OneSpeed,
-    /// Spacing is no term.
     #[error("all plots with this measure have the same spacing, so that spacing is left out")]
     OneSpacing,
-    /// The interaction would leave too few plots for the scatter.
     #[error("too few treatments were repeated to separate the interaction from chance: it is part of the residual")]
     NoReplication,
-    /// The treatments differ in their number of plots, in the trial or in a block.
     #[error(
         "the treatments differ in their number of plots, in the trial or in a block: sums of squares are sequential (type I), in the order of the table"
     )]
     Unbalanced,
-    /// Too few plots for blocks.
     #[error("the replications are not used as blocks: too few plots would remain to separate effects from chance")]
     NoBlocks,
-    /// A part of the effects of speed and spacing goes with the blocks.
     #[error(
         "the replications are not used as blocks: their effects cannot be separated from those of speed and spacing"
     )]
     InseparableBlocks,
-    /// Plots differ by more than the scatter of counting.
     #[error(
         "plots differ by more than counting explains: standard errors of the binomial model are multiplied by {factor:.2}, and t has the residual degrees of freedom (quasi-binomial)"
     )]
-    Overdispersed {
-        /// The root of the dispersion.
-        factor: f64,
-    },
-    /// The residual is zero.
+    Overdispersed { factor: f64 },
     #[error("the plots lie on the model exactly: without scatter there are no test statistics")]
     NoScatter,
 }

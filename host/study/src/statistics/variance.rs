@@ -164,7 +164,6 @@ impl AnalysisOfVariance {
 /// The plots of each level of a factor.
 pub(super) type Levels = Vec<Vec<usize>>;
 
-/// The levels of a factor, from its value in each plot.
 pub(super) fn levels<K: PartialEq>(plots: impl IntoIterator<Item = K>) -> Levels {
     grouped(plots.into_iter().zip(0..)).into_iter().map(|(_, plots)| plots).collect()
 }
@@ -185,7 +184,6 @@ fn additive_fit(factors: &[&Levels], values: &[f64]) -> Result<Fit, NoModel> {
     Ok(Fit { parameters: basis.rank(), sum_of_squares })
 }
 
-/// A mean for each level.
 pub(super) fn levels_fit(levels: &Levels, values: &[f64]) -> Fit {
     let of_level = |plots: &Vec<usize>| plots.iter().map(|&plot| values[plot]).collect::<Vec<f64>>();
     Fit { parameters: levels.len(), sum_of_squares: levels.iter().map(|plots| scatter(&of_level(plots))).sum() }

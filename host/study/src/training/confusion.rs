@@ -13,7 +13,6 @@ use uno_run::report::number_table;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Confusion([[usize; CLASSES.len()]; 2]);
 
-/// All classes.
 const CLASSES: [Class; 3] = [Class::Plant, Class::Unknown, Class::Weed];
 
 impl FromIterator<(Kind, Class)> for Confusion {

@@ -92,13 +92,11 @@ impl Model {
     }
 }
 
-/// The objects as examples.
 pub(super) fn quantised(scale: &Scale<COUNT>, objects: &[Labelled]) -> Vec<Example<COUNT>> {
     let example = |object: &Labelled| Example::new(scale.quantise(object.features.values()), label_of(object.kind));
     objects.iter().map(example).collect()
 }
 
-/// The answer of all other examples to the one at `index`.
 pub(super) fn answer_of_others(
     examples: &[Example<COUNT>],
     index: usize,

@@ -55,7 +55,6 @@ pub struct Crop {
     pub weed_widths_mm: RangeInclusive<f64>,
 }
 
-/// The paper's crop.
 const CHILLI: Crop = Crop {
     name: "chilli",
     speeds_mm_s: &SPEED_CLASSES_MM_S,
@@ -200,7 +199,6 @@ impl Classifier for &Recorder<'_> {
     }
 }
 
-/// The controller's detections in a row.
 fn roll_past(row: &Row, headland_mm: f64, speed_mm_s: f64, slip: f64) -> Result<Vec<Labelled>> {
     let standard = Machine::default();
     // The firmware knows only the wheel's size. A slipping wheel is a wheel of another size.

@@ -119,7 +119,6 @@ fn detections(table: &CsvTable) -> impl Iterator<Item = Line<'_>> {
     table.lines().filter(|line| COLUMNS.iter().any(|&column| line.text(column) != column))
 }
 
-/// The object in a line.
 fn object(line: Line) -> Result<Recorded, FileError> {
     let mut values = [0; COLUMNS.len()];
     for (value, column) in values.iter_mut().zip(COLUMNS) {

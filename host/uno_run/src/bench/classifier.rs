@@ -17,7 +17,6 @@ const EDGE_CYCLES: u64 = 2;
 /// Longest time of the bench: ten times its usual time.
 const BENCH_CYCLES: u64 = 20 * CYCLES_PER_SECOND;
 
-/// The advice for a wrong ELF.
 const RIGHT_ELF: &str = "run the ELF that `cargo bench-firmware` makes";
 
 /// Cycles of the calls of one task.

@@ -40,8 +40,7 @@ impl Telemetry {
         Ok(())
     }
 
-    /// The next byte of a question, for a caller that sends the bytes itself. `None` while enough questions are
-    /// pending.
+    /// The next byte of a question, for a caller that sends the bytes itself. `None` while enough are pending.
     pub(super) fn next_byte(&mut self) -> Option<u8> {
         if self.given == 0 {
             if self.unanswered == QUESTIONS_AHEAD {
@@ -54,12 +53,10 @@ impl Telemetry {
         Some(byte)
     }
 
-    /// The unsent rest of a question.
     pub(super) fn rest_of_question(&self) -> &'static [u8] {
         if self.given == 0 { &[] } else { &QUESTION[self.given..] }
     }
 
-    /// Counts the received bytes.
     pub(super) fn take(&mut self, received: &[ReceivedByte]) {
         for byte in received.iter().map(|received| received.byte) {
             self.bytes += 1;
@@ -81,8 +78,7 @@ impl Telemetry {
     }
 }
 
-/// Shortest time between two edges of the beam, which is the response time of its sensor, and its greatest random
-/// addition.
+/// Shortest time between two edges of the beam, its sensor's response time, and its greatest random addition.
 pub(super) const EDGE_CYCLES: u64 = CYCLES_PER_SECOND / 1000;
 const EDGE_SCATTER_CYCLES: u64 = EDGE_CYCLES / 5;
 

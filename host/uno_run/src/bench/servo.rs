@@ -31,7 +31,6 @@ pub struct Jitter {
 /// The vectors of the encoder's pins (data sheet, table 12-6): INT0 and INT1.
 const ENCODER_VECTORS: [u8; 2] = [1, 2];
 
-/// Cycles of the servo's frame.
 const FRAME_CYCLES: u64 = CYCLES_PER_SECOND / 50;
 
 /// Measures the pulses of the firmware at `elf` in HOLD, while the encoder turns, the status streams and the beam flickers.

@@ -76,7 +76,6 @@ impl Figures {
         table
     }
 
-    /// The lowest of the rates beside a load, without jitter.
     fn lowest_rate(&self, load: Load) -> f64 {
         let steady = self.rates.iter().filter(|rate| rate.turning.load == load && rate.turning.jitter == 0.0);
         steady.map(|rate| rate.counts_per_s).fold(f64::INFINITY, f64::min)

@@ -26,8 +26,7 @@ const ROWS_OF_A_THREAD: usize = 3;
 /// Slices after which the threads wait for each other: rare enough for a busy PC, and too short for a person to notice.
 const SLICES_IN_STEP: u64 = 5;
 
-/// Longest delay of the PC that is made up for. A longer delay is dropped: otherwise the chip would run too fast
-/// afterwards.
+/// Longest delay of the PC that is made up for. After a longer one the chip would run too fast, so that is dropped.
 const LATE_BY: Duration = Duration::from_millis(50);
 
 /// A fault of one row.
@@ -61,8 +60,7 @@ pub struct Ran {
 }
 
 impl LiveRows {
-    /// Powers up all Unos. Their courses must be those of one machine. The first course decides whether they run in
-    /// real time.
+    /// Powers up all Unos, with the courses of one machine. The first course decides whether they run in real time.
     ///
     /// # Errors
     /// If there is no program or it does not fit, no terminal can be opened, or a file is wrong.

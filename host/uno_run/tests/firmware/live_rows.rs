@@ -20,7 +20,6 @@ use uno_run::live::{Course, Setup};
 /// Walking pace.
 const SPEED_MM_S: f64 = 700.0;
 
-/// A row with its own plants.
 fn row(plants: usize, seed: u64) -> Row {
     let planting = Planting {
         plants,
@@ -34,7 +33,6 @@ fn row(plants: usize, seed: u64) -> Row {
     planting.grow_with_room(seed).expect("it is a row")
 }
 
-/// Setups of a machine with these rows.
 fn setups(rows: Vec<Row>, fast: bool) -> Vec<Setup> {
     let elf = firmware::build().expect("the firmware builds");
     let courses = Course::of_rows(rows, Machine::default(), SPEED_MM_S, 0.0).into_iter();

@@ -26,7 +26,6 @@ use uno_run::{UnoPort, firmware};
 const SPACING_MM: f64 = 500.0;
 const PLANTS: usize = 48;
 
-/// The number of the missing plant.
 const MISSING: usize = 24;
 
 /// When the machine sets off after the session has begun, in cycles.
@@ -66,8 +65,7 @@ impl Write for Clocked {
     }
 }
 
-/// The log of a machine with a receiver that weeds the row. `unplugged_s` is the time in which the receiver is
-/// unplugged.
+/// The log of a machine with a receiver that weeds the row. The receiver is unplugged during `unplugged_s`.
 fn recorded(
     row: &Row,
     motion: &Motion,
@@ -141,8 +139,7 @@ fn motion() -> Motion {
     Motion::steady(0.0, 500.0, 700.0, end_mm).change_speed(0.0, 500.0)
 }
 
-/// The position errors of the row's plants and weeds, in metres, and how each position was found. Each canopy of the row
-/// is in the log.
+/// The position errors of the row's plants and weeds, in metres, and how each was found. Each canopy is in the log.
 fn errors_m(job: &Job, row: &Row, setup: &ReceiverSetup) -> Vec<(f64, Basis)> {
     let truth = SimulatedReceiver::new(setup.clone());
     let objects: Vec<_> = job.events().filter(|event| matches!(event.kind, EventKind::Detection { .. })).collect();

@@ -38,7 +38,6 @@ fn whole_check() -> Report {
     report
 }
 
-/// The figures by their ids.
 fn figures(report: &Report) -> BTreeMap<String, f64> {
     report.lines.iter().map(|line| (line.id.clone(), line.measured.expect("it was measured"))).collect()
 }

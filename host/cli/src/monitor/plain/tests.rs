@@ -65,7 +65,6 @@ fn a_session_ends_without_a_status_that_it_knows() {
     assert!(output.contains("state=park"), "{output}");
 }
 
-/// An output that fails this way.
 struct Failing(ErrorKind);
 
 impl Write for Failing {
@@ -78,13 +77,11 @@ impl Write for Failing {
     }
 }
 
-/// Opens the port of this board.
 fn opener(board: &ScriptedBoard) -> Opener {
     let port = board.clone();
     Box::new(move || Ok(Wire::over(port.open().ok_or(LinkError::Absent("it".to_owned()))?, false)))
 }
 
-/// A session with this board and this input.
 fn talk(board: &ScriptedBoard, input: &[&str], output: &mut (impl Write + Send)) -> Result<Finding> {
     let (rows, chosen) = only_row(opener(board));
     let (sender, commands) = mpsc::sync_channel(9);
@@ -95,7 +92,6 @@ fn talk(board: &ScriptedBoard, input: &[&str], output: &mut (impl Write + Send))
     printing_aside(output, |lines| Talk::new(&rows, 0, &chosen, None, lines).run(&commands))
 }
 
-/// Waits until `hold` is typed.
 #[track_caller]
 fn until_held(board: &ScriptedBoard) {
     let has_held = (0..30_000).any(|_| {

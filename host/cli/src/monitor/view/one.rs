@@ -17,7 +17,6 @@ use ratatui::widgets::{Block, Paragraph, Row, Table, Wrap};
 const COLUMNS: u16 = 70;
 const LINES: u16 = 18;
 
-/// Draws the row.
 pub fn draw(model: &Model, row: &RowModel, frame: &mut Frame) {
     let area = frame.area();
     if area.width < COLUMNS || area.height < LINES {
@@ -111,7 +110,6 @@ fn draw_machine(row: &RowModel, frame: &mut Frame, area: Rect) {
     frame.render_widget(Paragraph::new(vec![state(row), second.into()]).block(block), area);
 }
 
-/// The marks of tool and beam.
 fn marks(row: &RowModel, columns: usize) -> String {
     let tool_at = column_of(row, columns, 0.0).round() as usize;
     let tool = match row.present().map(|status| status.tool_out) {
@@ -130,7 +128,6 @@ fn marks(row: &RowModel, columns: usize) -> String {
     marks.into_iter().collect()
 }
 
-/// The row from a little behind the tool to the beam. The machine rolls to the right.
 fn draw_ground(row: &RowModel, frame: &mut Frame, area: Rect) {
     let block = Block::bordered().title(" row ");
     let inner = block.inner(area);

@@ -19,12 +19,10 @@ const ROOMY: u16 = 16;
 const NAME: usize = 8;
 const WIDE: u16 = 60;
 
-/// Draws the rows.
 pub fn draw(model: &Model, rows: &[RowModel], frame: &mut Frame) {
     let area = frame.area();
     let is_roomy = area.height >= ROOMY;
-    // The top, a line of the console, the input, and the line below it. If there is room, also the console's frame and
-    // the advice.
+    // The top, a line of the console, the input, the line below it; with room, the console's frame and the advice.
     let others = if is_roomy { 3 + 3 + 1 } else { 3 };
     let room = usize::from(area.height.saturating_sub(others)).min(rows.len());
     let [top, list, advice, said, line, hint] =
@@ -95,7 +93,6 @@ fn draw_list(model: &Model, rows: &[RowModel], frame: &mut Frame, area: Rect) {
     frame.render_widget(Paragraph::new(lines), area);
 }
 
-/// A row's line.
 fn line(row: &RowModel, name: usize, columns: u16, is_target: bool) -> Line<'static> {
     let (state, style) = state(row);
     let mark = match row.answer {

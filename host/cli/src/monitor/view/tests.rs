@@ -12,12 +12,10 @@ use ratatui::backend::TestBackend;
 use ratatui::crossterm::event::KeyCode;
 use std::time::{Duration, Instant};
 
-/// The screen in this state.
 fn screen(model: &Model) -> String {
     screen_of(model, 90, 22)
 }
 
-/// A screen of this size.
 fn screen_of(model: &Model, columns: u16, lines: u16) -> String {
     let mut terminal = Terminal::new(TestBackend::new(columns, lines)).unwrap();
     terminal.draw(|frame| draw(model, frame)).unwrap();
@@ -36,7 +34,6 @@ fn machine_in_row(lines: &[&str]) -> Model {
     machine(&[&ROW[..], lines].concat())
 }
 
-/// The row's Uno is lost.
 fn lose(model: &mut Model, row: usize) {
     model.update(row, Happening::Lost("the port is gone: plug the Uno in again".to_owned()));
 }

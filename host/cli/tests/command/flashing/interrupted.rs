@@ -1,7 +1,8 @@
 //! Flashing that is interrupted: half a firmware does not run.
 
 use super::*;
-use crate::typed::typed;
+use crate::common::typed;
+use std::process::Child;
 use uno::{Pin, Uno};
 
 #[test]
@@ -11,22 +12,21 @@ fn half_a_firmware_does_not_run_and_flashing_again_mends_it() {
     let (elf, bootloader) = (firmware::build().expect("the firmware builds"), optiboot(folder.path()));
     let mut arguments = vec![Path::new("--stand"), Path::new("--bootloader"), &bootloader];
     arguments.extend([Path::new("--elf"), &elf, Path::new("--link"), &link]);
-    let _uno = VirtualUno::start(&arguments);
+    let _uno = virtual_uno(&arguments);
     // The real avrdude writes half of the pages. Then it cannot read the file with the first page.
     let half = "sed -i '900,$d' rest.hex\necho :00000001FF >>rest.hex\ncp standstill.hex rest.hex \"${0%/*}\"\n\
          echo torn >first.hex\nexec /usr/bin/avrdude \"$@\"\n";
     avrdude(folder.path(), half);
     // On a busy PC avrdude may miss the bootloader's time window.
     let answers = (0..5).any(|_| {
-        let mut command = weeder();
-        command.args(["flash", "--unproved", "--elf"]).arg(&elf).arg("--port").arg(&link);
-        let output = command.env("PATH", format!("{}:/usr/bin:/bin", folder.path().display())).output().unwrap();
-        let told = String::from_utf8_lossy(&output.stderr);
+        let mut flash = command(&["flash", "--unproved", "--elf"]);
+        flash.arg(&elf).arg("--port").arg(&link).env("PATH", format!("{}:/usr/bin:/bin", folder.path().display()));
+        let told = told(&flash.output().unwrap());
         told.contains("first.hex") && told.contains("half a firmware does not run")
     });
     assert!(answers, "avrdude came as far as the file with the first page");
-    let monitor = typed(weeder().args(["monitor", "--plain", "--port"]).arg(&link), "version\n");
-    assert_refused(&monitor, "nothing answers at this port");
+    let monitor = typed(command(&["monitor", "--plain", "--port"]).arg(&link), "version\n");
+    assert_fails(&monitor, "nothing answers at this port");
 
     // The same flash, and the servo's pin.
     let [standstill, rest] = ["standstill.hex", "rest.hex"].map(|file| fs::read_to_string(folder.path().join(file)));
@@ -56,7 +56,7 @@ fn ctrl_c_ends_avrdude_and_the_message_says_what_runs() {
     let pty = Pty::open().unwrap();
     let writing = endless(folder.path(), pty.path());
     assert!(Command::new("kill").args(["-INT", &writing.id().to_string()]).status().unwrap().success());
-    assert_refused(&writing.wait_with_output().unwrap(), "interrupted: flash it again. Half a firmware does not run");
+    assert_fails(&writing.wait_with_output().unwrap(), "interrupted: flash it again. Half a firmware does not run");
 }
 
 #[test]
@@ -73,5 +73,5 @@ fn a_port_that_vanishes_while_it_is_written_ends_avrdude() {
     let device = fs::canonicalize(&link).unwrap();
     drop(pty);
     std::os::unix::fs::symlink(device, &link).unwrap();
-    assert_refused(&writing.wait_with_output().unwrap(), "is gone while the Uno was written: plug it in, and flash it");
+    assert_fails(&writing.wait_with_output().unwrap(), "is gone while the Uno was written: plug it in, and flash it");
 }

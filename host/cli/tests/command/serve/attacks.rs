@@ -7,7 +7,6 @@ use std::collections::VecDeque;
 use std::net::{Ipv4Addr, Shutdown};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Addresses of the attackers.
 const ATTACKERS: [[u8; 4]; 4] = [[127, 0, 0, 3], [127, 0, 0, 4], [127, 0, 0, 5], [127, 0, 0, 6]];
 
 /// Simultaneous connections of an attack.
@@ -39,24 +38,28 @@ fn is_open(stream: &TcpStream) -> bool {
     }
 }
 
-/// A client that keeps one connection.
-struct Client<'a> {
-    stream: BufReader<TcpStream>,
+pub(super) struct Client<'a> {
+    pub(super) stream: BufReader<TcpStream>,
     host: &'a str,
     cookie: &'a str,
 }
 
 impl<'a> Client<'a> {
-    fn open(host: &'a str, cookie: &'a str) -> Self {
+    pub(super) fn open(host: &'a str, cookie: &'a str) -> Self {
         Self { stream: BufReader::new(connect(host, 0)), host, cookie }
+    }
+
+    /// Sends a request with these further lines in its head. Does not wait for the answer.
+    pub(super) fn send(&mut self, method: &str, path: &str, head: &str, body: &str) {
+        let rest = format!("{head}Content-Length: {}\r\n\r\n{body}", body.len());
+        let text = request(self.host, self.cookie, method, path, &rest);
+        self.stream.get_mut().write_all(text.as_bytes()).expect("it is open");
     }
 
     /// Sends a request. Returns the status and the body.
     fn ask(&mut self, method: &str, path: &str, body: &str) -> (u16, String) {
-        let Self { stream, host, cookie } = self;
-        let request = request(host, cookie, method, path, &format!("Content-Length: {}\r\n\r\n{body}", body.len()));
-        stream.get_mut().write_all(request.as_bytes()).expect("it is open");
-        answer(stream)
+        self.send(method, path, "", body);
+        answer(&mut self.stream)
     }
 
     fn command(&mut self, line: &str) -> (u16, String) {
@@ -138,10 +141,7 @@ fn attack<'a, T>(host: &'a str, text: &'a str, meanwhile: impl FnOnce() -> T) ->
 /// over open and new connections. The text is made for a host, with the cookie of another paired phone. An attacker at
 /// the computer itself takes the places of its own open connections, unless `keeps_open`.
 fn hold_is_obeyed_under(name: &str, keeps_open: bool, text: impl Fn(&str, &str) -> String) {
-    let folder = folder();
-    let (_uno, port) = uno(&folder, "uno", &["--stand"]);
-    let served = serve(&folder, &[&port], &["--allow-start"]);
-    served.make_ready(0);
+    let (served, _uno) = serve_uno(&[], &["--allow-start"]);
     let (phone, other) = (served.pair(), served.pair());
     for attacked in [&served.lan, &served.here] {
         let mut watching = Events::open(&served.lan, &phone, 0);
@@ -183,18 +183,11 @@ fn hold_is_obeyed_under_an_attack_of_half_open_connections() {
 /// The server accepts all of them before it reads from any, so that each place is taken and lost at once.
 #[test]
 fn a_hold_is_read_despite_a_crowd_of_half_open_connections() {
-    let folder = folder();
-    let (_uno, port) = uno(&folder, "uno", &["--stand"]);
-    let served = serve(&folder, &[&port], &["--allow-start"]);
-    served.make_ready(0);
+    let (served, _uno) = serve_uno(&[], &["--allow-start"]);
     let phone = served.pair();
-    let signal = |name: &str| {
-        let id = served.process.0.id().to_string();
-        assert!(Command::new("kill").args([name, &id]).status().expect("kill is there").success());
-    };
     for (host, cookie) in [(&served.lan, phone.as_str()), (&served.here, "")] {
         assert_eq!(served.command(&served.here, "", "start").0, 200);
-        signal("-STOP");
+        served.process.signal("-STOP");
         let half_open = |number: u8| {
             let stream = connect_from([127, 0, 1, number], host);
             (&stream).write_all(b"GET / HTTP/1.1\r\n").expect("it is connected");
@@ -207,7 +200,7 @@ fn a_hold_is_read_despite_a_crowd_of_half_open_connections() {
         // Its client sends nothing more, as one that gives up or ends.
         client.get_mut().shutdown(Shutdown::Write).expect("it is connected");
         crowd.extend((100..250).map(half_open));
-        signal("-CONT");
+        served.process.signal("-CONT");
         assert_eq!(answer(&mut client), (200, "ok\n".to_owned()));
     }
 }
@@ -245,10 +238,7 @@ fn hold_is_obeyed_under_an_attack_of_files_that_are_not_read() {
 
 #[test]
 fn a_request_in_chunks_or_with_two_lengths_is_refused() {
-    let folder = folder();
-    let (_uno, port) = uno(&folder, "uno", &["--stand"]);
-    let served = serve(&folder, &[&port], &[]);
-    served.make_ready(0);
+    let (served, _uno) = serve_uno(&[], &[]);
     let phone = served.pair();
     let send =
         |host: &str, cookie: &str, rest: &str| raw(host, &request(host, cookie, "POST", "/machines/0/command", rest));
@@ -305,10 +295,7 @@ fn files(process: &Running) -> usize {
 
 #[test]
 fn a_stream_that_hardly_reads_is_closed_before_buffers_fill() {
-    let folder = folder();
-    let (_uno, port) = uno(&folder, "uno", &["--stand"]);
-    let served = serve(&folder, &[&port], &[]);
-    served.make_ready(0);
+    let (served, _uno) = serve_uno(&[], &[]);
     let phone = served.pair();
     // Long enough for the timeouts of all previous requests.
     let mut watching = Events::open(&served.lan, &phone, 0);

@@ -4,7 +4,9 @@
 //! The network is the kernel's own, in two namespaces whose packets vanish for a while. Without the rights for
 //! namespaces, that test prints so and tries nothing.
 
+use super::attacks::{Client, answer};
 use super::*;
+use crate::common::{printed, typed};
 
 /// The computer's and the phone's address, and the addresses of their network cards.
 const COMPUTER: &str = "10.77.0.1";
@@ -16,28 +18,9 @@ const NO_CARD: &str = "02:00:00:00:77:99";
 /// The variable with the names of the namespaces, for the test that runs in the phone's.
 const NAMES: &str = "WEEDER_TEST_NAMESPACES";
 
-/// A phone's connection for one command at a time.
-struct Phone<'a> {
-    host: &'a str,
-    cookie: &'a str,
-    stream: BufReader<TcpStream>,
-}
-
-impl<'a> Phone<'a> {
-    fn open(host: &'a str, cookie: &'a str) -> Self {
-        Self { host, cookie, stream: BufReader::new(connect(host, 0)) }
-    }
-
-    /// Sends a command of a phone that has seen this message. Does not wait for the answer.
-    fn send(&mut self, line: &str, seen: &str) {
-        let seen = format!("Weeder-Seen: {seen}\r\nContent-Length: {}\r\n\r\n{line}", line.len());
-        let text = attacks::request(self.host, self.cookie, "POST", "/machines/0/command", &seen);
-        self.stream.get_mut().write_all(text.as_bytes()).expect("it is open");
-    }
-
-    fn answer(&mut self) -> (u16, String) {
-        attacks::answer(&mut self.stream)
-    }
+/// Sends a command of a phone that has seen this message. Does not wait for the answer.
+fn send(phone: &mut Client, line: &str, seen: &str) {
+    phone.send("POST", "/machines/0/command", &format!("Weeder-Seen: {seen}\r\n"), line);
 }
 
 /// The state of the machine, by a status that is sent after now.
@@ -60,10 +43,7 @@ fn assert_came_after_hold(answer: &(u16, String)) {
 
 #[test]
 fn every_command_but_hold_states_what_its_sender_has_seen() {
-    let folder = folder();
-    let (_uno, port) = uno(&folder, "uno", &["--stand"]);
-    let served = serve(&folder, &[&port], &["--allow-start"]);
-    served.make_ready(0);
+    let (served, _uno) = serve_uno(&[], &["--allow-start"]);
     let phone = served.pair();
     let command = |seen: &str, line: &str| served.post_after(seen, &served.lan, "/machines/0/command", &phone, line);
     for seen in ["", "x", "-1"] {
@@ -82,41 +62,30 @@ fn every_command_but_hold_states_what_its_sender_has_seen() {
     assert_eq!(state(&served.lan, &phone), "state=work");
 }
 
-/// Sends a signal to a process.
-fn signal(process: &Running, name: &str) {
-    assert!(Command::new("kill").args([name, &process.0.id().to_string()]).status().expect("kill is there").success());
-}
-
 #[test]
 fn a_start_that_waited_while_the_computer_slept_is_refused() {
-    let folder = folder();
-    let (_uno, port) = uno(&folder, "uno", &["--stand", "--no-reset"]);
-    let served = serve(&folder, &[&port], &["--allow-start"]);
-    served.make_ready(0);
+    let (served, _uno) = serve_uno(&["--no-reset"], &["--allow-start"]);
     let cookie = served.pair();
-    let mut phone = Phone::open(&served.lan, &cookie);
+    let mut phone = Client::open(&served.lan, &cookie);
     let seen = served.seen(&served.lan, &cookie);
-    signal(&served.process, "-STOP");
-    phone.send("start", &seen);
+    served.process.signal("-STOP");
+    send(&mut phone, "start", &seen);
     thread::sleep(Duration::from_millis(1500));
-    signal(&served.process, "-CONT");
-    assert_is_late(&phone.answer());
+    served.process.signal("-CONT");
+    assert_is_late(&answer(&mut phone.stream));
     assert_eq!(state(&served.lan, &cookie), "state=hold");
 }
 
 #[test]
 fn a_sleep_of_the_computer_is_no_silence_of_the_machine() {
-    let folder = folder();
     // A second connection would reset it, and its answers wait while the computer sleeps.
-    let (_uno, port) = uno(&folder, "uno", &["--stand"]);
-    let served = serve(&folder, &[&port], &["--allow-start"]);
-    served.make_ready(0);
+    let (served, _uno) = serve_uno(&[], &["--allow-start"]);
     assert_eq!(served.command(&served.here, "", "start"), (200, "ok\n".to_owned()));
     let mut events = Events::open(&served.here, "", 0);
     for _ in 0..3 {
-        signal(&served.process, "-STOP");
+        served.process.signal("-STOP");
         thread::sleep(Duration::from_millis(4000));
-        signal(&served.process, "-CONT");
+        served.process.signal("-CONT");
         for _ in 0..20 {
             let message = events.next().expect("it goes on");
             assert_ne!(message["is"], "lost", "{message}");
@@ -127,12 +96,9 @@ fn a_sleep_of_the_computer_is_no_silence_of_the_machine() {
 
 #[test]
 fn a_start_through_a_port_that_stalls_is_done_only_if_the_answer_says_so() {
-    let folder = folder();
-    let (uno, port) = uno(&folder, "uno", &["--stand", "--no-reset"]);
-    let served = serve(&folder, &[&port], &["--allow-start"]);
-    served.make_ready(0);
+    let (served, (uno, _folder)) = serve_uno(&["--no-reset"], &["--allow-start"]);
     let mut events = Events::open(&served.here, "", 0);
-    signal(&uno, "-STOP");
+    uno.signal("-STOP");
     // Mostly a poll is typed meanwhile. The command then waits behind it.
     thread::sleep(Duration::from_millis(300));
     let (status, said) = served.command(&served.here, "", "start");
@@ -140,7 +106,7 @@ fn a_start_through_a_port_that_stalls_is_done_only_if_the_answer_says_so() {
     // Typed before the poll, it is still in the port, which a pseudo terminal does not empty.
     let may_be_done = said.contains("may still do it");
     assert_eq!(status == 504, may_be_done, "{status} {said}");
-    signal(&uno, "-CONT");
+    uno.signal("-CONT");
     events.wait_for(|message| {
         assert!(may_be_done || !has(message, "said", "work"), "{message}");
         message["is"] == "there"
@@ -219,11 +185,7 @@ fn inside_the_namespace_of_the_phone() {
     let names: [&str; 2] = names.split(' ').collect::<Vec<_>>().try_into().expect("they are two");
     let folder = folder();
     let (_uno, port) = uno(&folder, "uno", &["--stand", "--no-reset"]);
-    let mut monitor = weeder();
-    monitor.args(["monitor", "--plain", "--port"]).arg(&port).stdin(Stdio::piped()).stdout(Stdio::null());
-    let mut monitor = monitor.spawn().expect("cargo has built it");
-    monitor.stdin.take().expect("it is piped").write_all(b"save\nclear\n").expect("it reads");
-    assert!(monitor.wait().expect("it ends").success());
+    printed(&typed(command(&["monitor", "--plain", "--port"]).arg(&port), "save\nclear\n"), 0);
     let mut command = Command::new("ip");
     command.args(["netns", "exec", names[0], env!("CARGO_BIN_EXE_weeder"), "serve"]);
     let served = serve_with(command, &folder, &[&port], &["--lan", COMPUTER, "--allow-start"]);
@@ -234,32 +196,32 @@ fn inside_the_namespace_of_the_phone() {
 
     // A start that comes seconds late, on a connection that its phone has given up or not.
     for gives_up in [false, true] {
-        let mut phone = Phone::open(host, &cookie);
+        let mut phone = Client::open(host, &cookie);
         let seen = served.seen(host, &cookie);
         connect_cable(names, false);
-        phone.send("start", &seen);
+        send(&mut phone, "start", &seen);
         if gives_up {
             phone.stream.get_mut().shutdown(std::net::Shutdown::Write).expect("it is open");
         }
         thread::sleep(Duration::from_millis(2500));
         connect_cable(names, true);
         if !gives_up {
-            assert_is_late(&phone.answer());
+            assert_is_late(&answer(&mut phone.stream));
         }
         assert_eq!(state(host, &cookie), "state=hold", "{gives_up}");
     }
 
     // A start, then HOLD on another connection. The start is sent again by the kernel, behind HOLD.
     for after_ms in [0, 100, 300, 600] {
-        let mut phones = [(); 2].map(|()| Phone::open(host, &cookie));
+        let mut phones = [(); 2].map(|()| Client::open(host, &cookie));
         let seen = served.seen(host, &cookie);
         connect_cable(names, false);
-        phones[0].send("start", &seen);
+        send(&mut phones[0], "start", &seen);
         thread::sleep(Duration::from_millis(after_ms));
         connect_cable(names, true);
-        phones[1].send("hold", "");
-        assert_eq!(phones[1].answer(), (200, "ok\n".to_owned()));
-        let (status, said) = phones[0].answer();
+        send(&mut phones[1], "hold", "");
+        assert_eq!(answer(&mut phones[1].stream), (200, "ok\n".to_owned()));
+        let (status, said) = answer(&mut phones[0].stream);
         // Before HOLD, or not at all.
         assert!(matches!(status, 200 | 412), "{status} {said}");
         assert_eq!(state(host, &cookie), "state=hold", "{after_ms} ms: {status} {said}");

@@ -1,12 +1,13 @@
 //! The processes of the tests, and their clients.
 
+use crate::common::{Running, command};
 use serde_json::Value;
 use socket2::{Domain, Socket, Type};
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -26,30 +27,6 @@ pub(super) const SCRIPT_BYTES: usize = 8 << 20;
 /// The address in the network, and the options that serve there.
 pub(super) const LAN: [&str; 2] = ["--lan", "127.0.0.2"];
 
-pub(super) fn weeder() -> Command {
-    Command::new(env!("CARGO_BIN_EXE_weeder"))
-}
-
-/// A process that is ended with its test.
-pub(super) struct Running(pub(super) Child);
-
-impl Running {
-    /// Ends it by Ctrl-C.
-    pub(super) fn interrupt(mut self) {
-        let id = self.0.id().to_string();
-        assert!(Command::new("kill").args(["-INT", &id]).status().expect("kill is there").success());
-        assert!(self.0.wait().expect("it ends").success());
-    }
-}
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        // It may have ended.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
 /// A folder with a page and a file of the ports' names.
 pub(super) fn folder() -> TempDir {
     let folder = TempDir::new().expect("there is room for a folder");
@@ -66,16 +43,11 @@ pub(super) fn folder() -> TempDir {
 pub(super) fn uno(folder: &TempDir, name: &str, options: &[&str]) -> (Running, PathBuf) {
     let elf = firmware::build().expect("the firmware builds");
     let link = folder.path().join(name);
-    let mut uno = weeder();
-    uno.arg("virtual-uno").arg("--elf").arg(elf).arg("--link").arg(&link).args(options).stdout(Stdio::piped());
-    let mut process = uno.spawn().expect("cargo has built it");
-    let mut line = String::new();
-    BufReader::new(process.stdout.take().expect("it is piped")).read_line(&mut line).expect("it says where it is");
-    assert!(!line.is_empty(), "the virtual Uno has ended");
-    (Running(process), link)
+    let mut uno = command(&["virtual-uno", "--elf"]);
+    let (uno, _) = Running::with_first_line(uno.arg(elf).arg("--link").arg(&link).args(options));
+    (uno, link)
 }
 
-/// `weeder serve`.
 pub(super) struct Served {
     pub(super) process: Running,
     /// Its two hosts, and the code.
@@ -89,9 +61,16 @@ pub(super) struct Served {
 
 /// Serves these ports, also in the network.
 pub(super) fn serve(folder: &TempDir, ports: &[&Path], options: &[&str]) -> Served {
-    let mut command = weeder();
-    command.arg("serve");
-    serve_with(command, folder, ports, &[&LAN, options].concat())
+    serve_with(command(&["serve"]), folder, ports, &[&LAN, options].concat())
+}
+
+/// Serves a standing virtual Uno that is ready. Returns also the Uno, and its folder.
+pub(super) fn serve_uno(uno_options: &[&str], options: &[&str]) -> (Served, (Running, TempDir)) {
+    let folder = folder();
+    let (uno, port) = uno(&folder, "uno", &[&["--stand"], uno_options].concat());
+    let served = serve(&folder, &[&port], options);
+    served.make_ready(0);
+    (served, (uno, folder))
 }
 
 /// The same by a command that ends with `serve`.
@@ -111,8 +90,8 @@ pub(super) fn serve_telling(
     for port in ports {
         serve.arg("--port").arg(port);
     }
-    let mut process = serve.stdout(Stdio::piped()).stderr(operator).spawn().expect("cargo has built it");
-    let mut lines = BufReader::new(process.stdout.take().expect("it is piped")).lines().map_while(Result::ok);
+    let mut process = Running::start(serve.stdout(Stdio::piped()).stderr(operator));
+    let mut lines = BufReader::new(process.0.stdout.take().expect("it is piped")).lines().map_while(Result::ok);
     let mut next = || lines.next().expect("it says where the page is");
     let (here, lan) = (next(), next());
     let host = |line: &str| line["http://".len()..].split('/').next().expect("it is an address").to_owned();
@@ -120,26 +99,21 @@ pub(super) fn serve_telling(
     let spelled = format!("{}-{}", &code[..4], &code[4..]);
     assert!(next().ends_with(&spelled), "{code}");
     let told = Arc::new(Mutex::new(String::new()));
-    let (heard, stderr) = (Arc::clone(&told), process.stderr.take());
+    let (heard, stderr) = (Arc::clone(&told), process.0.stderr.take());
     thread::spawn(move || {
         for line in stderr.into_iter().flat_map(|stderr| BufReader::new(stderr).lines().map_while(Result::ok)) {
             heard.lock().expect("no thread has panicked").push_str(&(line + "\n"));
         }
     });
     let agent = Agent::config_builder().http_status_as_error(false).max_redirects(0).timeout_global(Some(PATIENCE));
-    Served { process: Running(process), here: host(&here), lan: host(&lan), code, told, agent: agent.build().into() }
+    Served { process, here: host(&here), lan: host(&lan), code, told, agent: agent.build().into() }
 }
 
 impl Served {
-    /// Whether the output for the operator contains these words.
-    pub(super) fn has_reported(&self, words: &str) -> bool {
-        self.told.lock().expect("no thread has panicked").contains(words)
-    }
-
     #[track_caller]
     pub(super) fn wait_until_told(&self, words: &str) {
         for _ in 0..PATIENCE.as_millis() / LOOK.as_millis() {
-            if self.has_reported(words) {
+            if self.told.lock().expect("no thread has panicked").contains(words) {
                 return;
             }
             thread::sleep(LOOK);
@@ -192,7 +166,6 @@ impl Served {
         (answer.status().as_u16(), answer.body_mut().read_to_string().expect("it is text"), cookie)
     }
 
-    /// Pairs a phone: its cookie.
     pub(super) fn pair(&self) -> String {
         let (status, said, cookie) = self.try_code(&self.code);
         assert_eq!(status, 204, "{said}");
@@ -214,7 +187,6 @@ impl Served {
     }
 }
 
-/// Whether a message has this in a field.
 pub(super) fn has(message: &Value, field: &str, words: &str) -> bool {
     message[field].as_str().is_some_and(|text| text.contains(words))
 }

@@ -1,22 +1,19 @@
 //! Alarms while a machine is set up: each is shown with its advice, and cleared only after a question.
 
-use super::{answered, lead, type_to, uno};
-use crate::typed::typed;
+use super::{answered, folder_with_uno, lead, type_to, uno};
+use crate::common::{command, typed};
 use std::path::Path;
-use std::process::Command;
 use tempfile::TempDir;
 
 /// Types these lines in `weeder monitor`. Returns its output.
 fn monitored(folder: &Path, lines: &str) -> String {
-    let mut monitor = Command::new(env!("CARGO_BIN_EXE_weeder"));
-    monitor.current_dir(folder).args(["monitor", "--plain", "--port", "./uno"]);
-    String::from_utf8_lossy(&typed(&mut monitor, lines).stdout).into_owned()
+    let mut monitor = command(&["monitor", "--plain", "--port", "./uno"]);
+    String::from_utf8_lossy(&typed(monitor.current_dir(folder), lines).stdout).into_owned()
 }
 
 #[test]
 fn no_alarm_is_cleared_without_a_question() {
-    let folder = TempDir::new().expect("there is room for a folder");
-    let (_uno, _) = uno(folder.path(), &["--stand", "--no-reset", "--link", "uno"]);
+    let (folder, _uno) = folder_with_uno(&["--no-reset"]);
     let stopped = answered(folder.path(), &["q"]);
     assert!(stopped.contains("alarm 5-1 settings_lost. If a file has them, type q."), "{stopped}");
     // The switch is open, and the tool is out: a stuck tool.
@@ -29,8 +26,7 @@ fn no_alarm_is_cleared_without_a_question() {
 
 #[test]
 fn an_end_switch_that_is_not_there_is_set_off_when_its_alarm_comes() {
-    let folder = TempDir::new().expect("there is room for a folder");
-    let (_uno, _) = uno(folder.path(), &["--stand", "--link", "uno"]);
+    let (folder, _uno) = folder_with_uno(&[]);
     let mut questions = 0;
     let said = lead(folder.path(), &["--port", "./uno"], |text, keyboard| {
         if text.contains("and clear the alarm [go on]") {

@@ -1,11 +1,9 @@
 //! A set-up that goes on with another part, board or lead than its file has.
 
-use super::uno;
-use crate::common::said;
-use crate::typed::{printed, typed};
+use super::folder_with_uno;
+use crate::common::{Running, assert_fails, assert_has, command, printed, said, typed};
 use std::fs;
 use std::path::Path;
-use std::process::Command;
 use tempfile::TempDir;
 
 /// A file of a machine whose servo is timed, with its tool on the other side than the default's.
@@ -30,30 +28,23 @@ lead_in_ms=45
 
 /// Answers `weeder set-up` with these words and lines. Returns its output.
 fn answered(folder: &Path, words: &[&str], lines: &str) -> String {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
-    command.current_dir(folder).args(["set-up", "--port", "./uno"]).args(words);
-    printed(&typed(&mut command, lines), 0)
+    printed(&typed(command(&["set-up", "--port", "./uno"]).current_dir(folder).args(words), lines), 0)
 }
 
 /// A virtual Uno with the settings of [`KEPT`], and its folder.
-fn set_up_before() -> (TempDir, impl Drop) {
-    let folder = TempDir::new().expect("there is room for a folder");
+fn set_up_before() -> (TempDir, Running) {
+    let (folder, uno) = folder_with_uno(&["--fast"]);
     fs::write(folder.path().join("set-up.txt"), KEPT).expect("there is room for a file");
-    let (uno, _) = uno(folder.path(), &["--stand", "--fast", "--link", "uno"]);
     let restored = answered(folder.path(), &[], "\ns\ns\nq\n");
-    assert!(restored.contains("Set the settings of set-up.txt again: yes, no [yes]: "), "{restored}");
-    assert!(
-        !restored.contains("does not have") && restored.contains("Step 6 of 8, Time the servo: done"),
-        "{restored}"
-    );
+    let parts = ["Set the settings of set-up.txt again: yes, no [yes]: ", "Step 6 of 8, Time the servo: done"];
+    assert_has(&restored, parts);
+    assert!(!restored.contains("does not have"), "{restored}");
     (folder, uno)
 }
 
-/// Types lines on the console.
 fn typed_on_the_console(folder: &Path, lines: &str) {
-    let mut monitor = Command::new(env!("CARGO_BIN_EXE_weeder"));
-    monitor.current_dir(folder).args(["monitor", "--plain", "--port", "./uno"]);
-    printed(&typed(&mut monitor, lines), 0);
+    let mut monitor = command(&["monitor", "--plain", "--port", "./uno"]);
+    printed(&typed(monitor.current_dir(folder), lines), 0);
 }
 
 #[test]
@@ -61,11 +52,9 @@ fn a_lead_that_was_timed_meanwhile_is_not_replaced_by_the_kept_one() {
     let (folder, _uno) = set_up_before();
     typed_on_the_console(folder.path(), "set lead_out_ms 234\nsave\n");
     let asked = answered(folder.path(), &[], "\ns\ns\noff\nq\n");
-    for words in ["lead_out_ms is 234, and was 230", "Next, time the servo: `calibrate servo` (0 of 2 done)"] {
-        assert!(asked.contains(words), "{words:?} is not in\n{asked}");
-    }
+    assert_has(&asked, ["lead_out_ms is 234, and was 230", "Next, time the servo: `calibrate servo` (0 of 2 done)"]);
     let settings = said(folder.path(), &["settings", "pull", "--port", "./uno", "--json"]);
-    assert!(settings.contains("\"lead_out_ms\": 234"), "{settings}");
+    assert_has(&settings, ["\"lead_out_ms\": 234"]);
 }
 
 #[test]
@@ -73,10 +62,8 @@ fn another_tool_in_the_machine_s_file_opens_its_steps_again() {
     let (folder, _uno) = set_up_before();
     fs::write(folder.path().join("wide.toml"), "[intra_row]\nwidth = \"200 mm\"\n").expect("there is room for a file");
     let said = answered(folder.path(), &["--machine", "wide.toml"], "s\ns\ns\ns\ns\ns\n");
-    for words in ["intra_row.width is 200 mm, and was 130", "Open: step 3, ", "Open: step 5, "] {
-        assert!(said.contains(words), "{words:?} is not in\n{said}");
-    }
-    assert!(said.contains("Warning: that damages too many plants."), "{said}");
+    assert_has(&said, ["intra_row.width is 200 mm, and was 130", "Open: step 3, ", "Open: step 5, "]);
+    assert_has(&said, ["Warning: that damages too many plants."]);
 }
 
 #[test]
@@ -98,9 +85,7 @@ fn a_slower_servo_or_wider_tool_that_is_typed_opens_its_steps() {
 fn a_step_can_be_done_again_and_only_that() {
     let (folder, _uno) = set_up_before();
     let said = answered(folder.path(), &["--step", "6"], "s\ns\noff\nq\n");
-    for words in ["Step 3 of 8, Fit a wider tool: done", "(0 of 2 done)"] {
-        assert!(said.contains(words), "{words:?} is not in\n{said}");
-    }
+    assert_has(&said, ["Step 3 of 8, Fit a wider tool: done", "(0 of 2 done)"]);
 }
 
 #[test]
@@ -111,12 +96,9 @@ fn a_file_of_another_board_is_used_only_if_the_user_says_so() {
     let (before, after) = kept.split_once("board ").expect("it names its board");
     let (_, after) = after.split_once('\n').expect("it has more lines");
     fs::write(&path, format!("{before}board serial number 42\n{after}")).expect("there is room for a file");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
-    command.current_dir(&folder).args(["set-up", "--port", "./uno"]);
-    let refused = typed(&mut command, "\n");
-    assert_eq!(refused.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&refused.stderr).contains("give another --state"), "{refused:?}");
+    let refused = typed(command(&["set-up", "--port", "./uno"]).current_dir(&folder), "\n");
+    assert_fails(&refused, "give another --state");
     let said = answered(folder.path(), &[], "yes\ns\ns\nq\n");
-    assert!(said.contains("was made for the board with serial number 42. This one has port "), "{said}");
-    assert!(said.contains("Step 6 of 8, Time the servo: done"), "{said}");
+    assert_has(&said, ["was made for the board with serial number 42. This one has port "]);
+    assert_has(&said, ["Step 6 of 8, Time the servo: done"]);
 }
