@@ -12,7 +12,7 @@ mod view;
 
 use crate::ports::{Ports, find};
 use crate::record::{self, Logs};
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use clap::Args;
 use frame::Finding;
 use link::row_names::ALL;
@@ -72,6 +72,11 @@ fn addressed<'a>(line: &'a str, names: &[String], chosen: Option<usize>) -> Resu
 }
 
 pub fn run(arguments: &Arguments) -> Result<Finding> {
+    // Before a port is opened, which resets its Uno.
+    ensure!(
+        arguments.plain || terminal::has_screen(),
+        "this terminal shows no full screen (TERM is `dumb` or not set): --plain does without"
+    );
     let chosen = arguments.ports.choose(None)?;
     let logs = arguments.log.as_deref().map(|out| Logs::open(out, &chosen)).transpose()?;
     let (rows, connected) = record::open(&chosen)?;

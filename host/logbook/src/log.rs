@@ -55,9 +55,10 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Whether a log that is continued may go on with such a line. Its clock then begins again.
+    /// Whether a log that is continued may go on with such a line. Its clock then begins again. A hold is typed before the
+    /// machine has answered.
     fn may_begin(self) -> bool {
-        matches!(self, Self::Connected | Self::Started | Self::Lost | Self::Antenna | Self::GpsFound | Self::GpsLost)
+        !matches!(self, Self::Setting | Self::Example | Self::Status | Self::Event | Self::Gps | Self::GpsDamaged)
     }
 }
 

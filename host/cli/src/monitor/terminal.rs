@@ -26,6 +26,11 @@ const LOOK: Duration = Duration::from_micros(100);
 /// Longest wait at the end for the answers to a HOLD.
 const LAST_HOLD: Duration = Duration::from_secs(2);
 
+/// Whether the terminal can show a full screen. Without its name, too, nobody knows.
+pub fn has_screen() -> bool {
+    !cfg!(unix) || env::var("TERM").is_ok_and(|name| !matches!(name.as_str(), "" | "dumb"))
+}
+
 /// Watches until Ctrl-C or Ctrl-D, or a signal to end. Fails if the terminal or a log fails.
 pub fn run(rows: &Rows, names: Vec<String>, mut logs: Option<Logs>) -> Result<()> {
     let stop = ctrl_c()?;
@@ -35,9 +40,6 @@ pub fn run(rows: &Rows, names: Vec<String>, mut logs: Option<Logs>) -> Result<()
         has_keys,
         "this terminal passes no keys, not even Esc: use PowerShell, `winpty weeder monitor`, or --plain"
     );
-    // Without a name, too, nobody knows what the terminal can do.
-    let is_dumb = cfg!(unix) && env::var("TERM").map_or(true, |name| matches!(name.as_str(), "" | "dumb"));
-    ensure!(!is_dumb, "this terminal shows no full screen (TERM is `dumb` or not set): --plain does without");
     let mut terminal = ratatui::try_init().context("the terminal cannot be drawn on: --plain does without")?;
     // On Windows, a click would begin a selection: the output stops, and the first Esc only ends the selection.
     if cfg!(windows) {

@@ -130,6 +130,15 @@ fn esc_is_hold_with_any_key_behind_it_and_after_a_long_paste() {
 }
 
 #[test]
+fn a_terminal_without_a_screen_is_shown_the_plain_monitor() {
+    for name in ["dumb", ""] {
+        let output = command(&["monitor", "--port", "none"]).env("TERM", name).output().expect("it runs");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(!output.status.success() && said.contains("--plain does without"), "{said}");
+    }
+}
+
+#[test]
 fn a_terminated_monitor_restores_the_terminal() {
     let mut terminal = Terminal::with_monitor();
     terminal.monitor.signal("-TERM");

@@ -43,8 +43,8 @@ fn a_record_that_was_sorted_or_named_twice_is_refused() {
     fs::copy(folder.path().join("log.csv"), folder.path().join("log (1).csv")).unwrap();
     // As a table that a spreadsheet has sorted by its second column.
     save("sorted.csv", &[lines[0], lines[3], lines[1], lines[2]]);
-    // A record that was continued.
-    save("two days.csv", &[&lines[..], &lines[..]].concat());
+    // A record that was continued, by a hold before the machine had answered.
+    save("two days.csv", &[&lines[..], &["0,command,hold"], &lines[..]].concat());
     for (logs, refusal) in [
         (&["log.csv", "two days.csv"][..], None),
         (&["sorted.csv"], Some("sorted.csv, line 4: time_ms goes back from 150 to 0")),

@@ -13,7 +13,7 @@ impl Swing {
         let mut said = vec![
             format!(
                 "The tool clears a {} of {:.0} mm at {:.1} degrees, {:.0} mm aside, {} us of the pulse away from the row.",
-                if self.stem_zone_mm > 0 { "stem's zone" } else { "canopy" },
+                if self.stem_zone_mm > 0 { "stem's protected circle" } else { "canopy" },
                 kept_mm(machine),
                 self.angle_degrees,
                 MM.value(machine.intra_row.shank_length) * self.angle_degrees.to_radians().sin(),
@@ -90,14 +90,14 @@ impl Swing {
                  its shank can stand inside their {} though the tool is out.",
                 self.clear_height_mm,
                 MM.value(machine.swing.room),
-                if self.stem_zone_mm > 0 { "stem's zone" } else { "canopy" }
+                if self.stem_zone_mm > 0 { "stem's protected circle" } else { "canopy" }
             ));
         }
         if machine.inter_row.tools == 0 {
             return said;
         }
         let (zone, half) = if self.stem_zone_mm > 0 {
-            ("stem zone", machine.swing.protected / 2.0)
+            ("stem's protected circle", machine.swing.protected / 2.0)
         } else {
             ("protection zone", machine.crop.protection_zone)
         };
@@ -106,7 +106,7 @@ impl Swing {
             said.push(format!("The sweeps run {:.0} mm inside the {zone}: start them farther out.", -beside_mm));
         } else if self.stem_zone_mm > 0 {
             said.push(format!(
-                "The sweeps start {beside_mm:.0} mm beside the stem zone's protected part. They cut plants if machine and plants \
+                "The sweeps start {beside_mm:.0} mm beside the {zone}. They cut plants if machine and plants \
                  stray farther in all."
             ));
         }

@@ -50,7 +50,7 @@ fn a_stem_zone_needs_a_shorter_stroke_than_the_canopy() {
     let lines = ["set servo_out_us 1695", "set lead_out_ms 152", "set stem_zone_mm 100"];
     assert!(lines.iter().all(|line| stem.set_lines().iter().any(|set| set == line)), "{:?}", stem.set_lines());
     assert!(
-        stem.sentences(&machine, torque)[0].starts_with("The tool clears a stem's zone of 90 mm at 17."),
+        stem.sentences(&machine, torque)[0].starts_with("The tool clears a stem's protected circle of 90 mm at 17."),
         "{stem:?}"
     );
 }
@@ -197,11 +197,11 @@ fn a_machine_that_is_too_fast_and_sweeps_in_the_zone_are_named() {
     let inside = words(|machine| {
         (machine.swing.protected, machine.swing.sweep_from) = (MM.of(90.0), MM.of(20.0));
     });
-    assert!(inside.contains("The sweeps run 25 mm inside the stem zone:"), "{inside}");
+    assert!(inside.contains("The sweeps run 25 mm inside the stem's protected circle:"), "{inside}");
     let beside = words(|machine| {
         (machine.swing.protected, machine.swing.sweep_from) = (MM.of(90.0), MM.of(65.0));
     });
-    assert!(beside.contains("The sweeps start 20 mm beside the stem zone's protected part."), "{beside}");
+    assert!(beside.contains("The sweeps start 20 mm beside the stem's protected circle."), "{beside}");
     assert!(words(|machine| machine.swing.sweep_from = MM.of(20.0)).contains("30 mm inside the protection zone"));
     let (usual, without) = (words(|_| ()), words(|machine| machine.inter_row.tools = 0));
     assert!(!usual.contains("alarm 3-1") && !usual.contains("The sweeps"), "{usual}");
