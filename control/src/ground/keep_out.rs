@@ -46,7 +46,8 @@ impl Canopy {
     /// The canopy of a detection, if it is a plant, and `zone` around its middle. Leaves beside the zone are kept too, unless it
     /// `is_single`. Without its beginning, it has half of the zone behind its end.
     pub(super) fn of(detection: &Detection, zone: Length, is_single: bool) -> Self {
-        // If the beginning was not seen, clear ground may count as a part of the plant: the stem may stand at the end.
+        // If the beginning was not seen, clear ground may count as a part of the plant: the stem may stand at the end. A detection of the
+        // second beam behind the last plant counts as such.
         let width = if detection.cut { Length::ZERO } else { detection.width() };
         let mut canopy = Self { leading: detection.leading, trailing: detection.trailing, trim: trim(width, zone) };
         if !is_single {

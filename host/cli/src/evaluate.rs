@@ -2,8 +2,10 @@
 
 use anyhow::{Context, Result};
 use clap::Args;
+use field::counted;
 use frame::{Messages, OutFolder, OutName, Replace, Results, command_line, number_within, source, whole_within};
 use link::settings::shown;
+use logbook::follower;
 use logbook::log::{Entry, Kind};
 use logbook::worked::worked;
 use serde_json::{Value, json};
@@ -62,6 +64,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
                     Messages,
                     "Warning: line {number} of the log has `{text}`, which this version does not allow: it counts as unknown"
                 );
+            }
+            let unread = follower::unread(&log);
+            if unread > 0 {
+                let lines = counted(unread, "line");
+                writeln!(Messages, "Warning: {lines} of the log left out: damaged, or of another firmware");
             }
             let stretches = worked(&log);
             let joined = field_log::join(&mut records, &stretches, &arguments.plots)?;

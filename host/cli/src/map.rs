@@ -81,6 +81,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
                 counted(job.without_wheel as usize, "status line")
             );
         }
+        if job.left_out > 0 {
+            writeln!(
+                Messages,
+                "{name}: {} left out: damaged, of another firmware, or with a position far from those around",
+                counted(job.left_out as usize, "line")
+            );
+        }
         jobs.push((name, job));
     }
     let counted: Vec<(&str, Summary)> =

@@ -25,23 +25,23 @@ const RETRY: Duration = Duration::from_secs(1);
 #[derive(Args)]
 pub struct AntennaArguments {
     /// Distance from the antenna forward to the beam in mm, -20000 to 20000; negative behind it. Default: 0.
-    #[arg(long, value_name = "MM", value_parser = number_within(-20_000.0..=20_000.0))]
+    #[arg(long, value_name = "MM", value_parser = number_within(-Antenna::FARTHEST_MM..=Antenna::FARTHEST_MM))]
     beam_ahead: Option<f64>,
     /// Distance from the antenna right to the beam's crossing of the row in mm, -20000 to 20000; negative to the
     /// left. Default: 0.
-    #[arg(long, value_name = "MM", value_parser = number_within(-20_000.0..=20_000.0))]
+    #[arg(long, value_name = "MM", value_parser = number_within(-Antenna::FARTHEST_MM..=Antenna::FARTHEST_MM))]
     beam_right: Option<f64>,
     /// Distance forward to the tool in mm, -20000 to 20000. Default: `beam_to_tool_mm` behind the beam.
-    #[arg(long, value_name = "MM", value_parser = number_within(-20_000.0..=20_000.0))]
+    #[arg(long, value_name = "MM", value_parser = number_within(-Antenna::FARTHEST_MM..=Antenna::FARTHEST_MM))]
     tool_ahead: Option<f64>,
     /// Distance right to the tool in mm, -20000 to 20000. Default: as for the beam.
-    #[arg(long, value_name = "MM", value_parser = number_within(-20_000.0..=20_000.0))]
+    #[arg(long, value_name = "MM", value_parser = number_within(-Antenna::FARTHEST_MM..=Antenna::FARTHEST_MM))]
     tool_right: Option<f64>,
     /// Delay of a fix in ms, 0 to 2000. Default: 0.
-    #[arg(long, value_name = "MS", value_parser = number_within(0.0..=2000.0))]
+    #[arg(long, value_name = "MS", value_parser = number_within(0.0..=Antenna::LATEST_MS))]
     gps_delay: Option<f64>,
     /// Standard deviation of a fix in mm, 1 to 20000. Default: the usual one of its quality.
-    #[arg(long, value_name = "MM", value_parser = number_within(1.0..=20_000.0))]
+    #[arg(long, value_name = "MM", value_parser = number_within(1.0..=Antenna::FARTHEST_MM))]
     gps_error: Option<f64>,
 }
 

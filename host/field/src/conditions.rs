@@ -149,7 +149,8 @@ impl Conditions {
 
     /// The names of parameters that differ from their defaults, and that a pass of one row at a steady speed does not use.
     pub fn unused_by_a_row(&self) -> Vec<&'static str> {
-        const USED: [&str; 5] = [
+        const USED: [&str; 6] = [
+            "plot.row_spacing_mm",
             "crop.protected_mm",
             "ground.slip_percent",
             "sensors.beam_mm",
@@ -159,7 +160,11 @@ impl Conditions {
         let default = Self::default();
         let changed = self.values().zip(default.values()).filter(|((_, value), (_, default))| value != default);
         let names = changed.map(|((parameter, _), _)| parameter.name);
-        names.filter(|name| !name.starts_with("machine.") && !USED.contains(name)).collect()
+        let is_used = |name: &str| match name {
+            "machine.side_play_mm" | "machine.power_hp" => false,
+            _ => name.starts_with("machine.") || USED.contains(&name),
+        };
+        names.filter(|name| !is_used(name)).collect()
     }
 
     /// Whether the machine strays farther than its sweeps allow, in sentences.

@@ -23,17 +23,23 @@ pub struct Antenna {
 }
 
 impl Antenna {
-    /// Parses a log's line. `None` if it is another line.
+    /// The greatest distance from the antenna, and the greatest standard deviation, in mm.
+    pub const FARTHEST_MM: f64 = 20_000.0;
+    /// The greatest delay, in ms.
+    pub const LATEST_MS: f64 = 2000.0;
+
+    /// Parses a log's line. `None` if it is another line, or damaged.
     pub fn parse(line: &str) -> Option<Self> {
         let values = Values(line);
-        let number = |key| values.number::<f64>(key).filter(|value| value.is_finite());
+        let number = |key| values.number::<f64>(key);
+        let distance_mm = |key| number(key).filter(|mm| mm.abs() <= Self::FARTHEST_MM);
         Some(Self {
-            beam_ahead_mm: number("beam_ahead_mm")?,
-            beam_right_mm: number("beam_right_mm")?,
-            tool_ahead_mm: number("tool_ahead_mm"),
-            tool_right_mm: number("tool_right_mm"),
-            delay_ms: number("delay_ms")?,
-            error_mm: number("error_mm").filter(|&error_mm| error_mm > 0.0),
+            beam_ahead_mm: distance_mm("beam_ahead_mm")?,
+            beam_right_mm: distance_mm("beam_right_mm")?,
+            tool_ahead_mm: distance_mm("tool_ahead_mm"),
+            tool_right_mm: distance_mm("tool_right_mm"),
+            delay_ms: number("delay_ms").filter(|ms| (0.0..=Self::LATEST_MS).contains(ms))?,
+            error_mm: distance_mm("error_mm").filter(|&error_mm| error_mm > 0.0),
         })
     }
 

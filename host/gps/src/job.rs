@@ -176,6 +176,8 @@ pub struct Job {
     pub spun_m: f64,
     /// Statuses that count for nothing, because no wheel is known: the log lacks the settings, or this version does not allow one.
     pub without_wheel: u64,
+    /// Lines of the machine that were left out: damaged, of another firmware, or with a position far from those around it.
+    pub left_out: u64,
 }
 
 impl Job {
@@ -217,9 +219,10 @@ impl Job {
                         job.without_wheel += 1;
                     }
                 }
-                Followed::Event(event) => reading.event(entry, &event, &follower),
+                unread if unread.is_unread() => job.left_out += 1,
+                Followed::Event(event) => job.left_out += u64::from(!reading.event(entry, &event, &follower)),
                 Followed::Answered(command, true) => reading.label(&command),
-                _ => {}
+                _ => job.left_out += u64::from(entry.kind == Kind::Antenna && antenna.is_none()),
             }
             match entry.kind {
                 Kind::Gps | Kind::GpsDamaged => receiver.take(entry.time_ms as f64, &entry.text),

@@ -4,7 +4,7 @@
 //! headland is no gap in the stand: the work switch marks the row end. If a spacing is longer than one and a half of
 //! the usual one, plants are missing in it. Unknown detections count as plants.
 
-use crate::job::{Did, Event, EventKind, Job};
+use crate::job::{Did, Event, EventKind, Job, PassedGround};
 use crate::track::{Basis, Found};
 use crate::wheel::Ratio;
 use link::Class;
@@ -120,7 +120,7 @@ impl Summary {
         }
         let (mut work_ms, mut record_ms) = (0, 0);
         for stretch in &job.stretches {
-            record_ms += stretch.time_ms.end - stretch.time_ms.start;
+            record_ms = stretch.time_ms.end.saturating_sub(stretch.time_ms.start).saturating_add(record_ms);
             for ground in stretch.ground.iter().filter(|ground| ground.did != Did::Rolled) {
                 let length_m = ground.distance_m.end - ground.distance_m.start;
                 summary.worked_m += length_m;
@@ -158,13 +158,19 @@ fn spacings_mm(job: &Job) -> Vec<f64> {
     for stretch in &job.stretches {
         let is_plant =
             |event: &&Event| matches!(event.kind, EventKind::Detection { class: Class::Plant | Class::Unknown, .. });
-        let plants: Vec<f64> = stretch.events.iter().filter(is_plant).map(|plant| plant.distance_m).collect();
-        // Both are known by the wheel's distance. A day has few rests, and many swings.
-        let rests = stretch.ground.iter().filter(|ground| ground.did == Did::Rolled).map(|rest| &rest.distance_m);
-        let rests: Vec<_> = rests.collect();
-        let is_spacing =
-            |pair: &&[f64]| pair[1] > pair[0] && !rests.iter().any(|rest| rest.start < pair[1] && pair[0] <= rest.end);
-        spacings.extend(plants.windows(2).filter(is_spacing).map(|pair| 1000.0 * (pair[1] - pair[0])));
+        let plants: Vec<&Event> = stretch.events.iter().filter(is_plant).collect();
+        // A day has few rests, and many swings.
+        let rests: Vec<&PassedGround> = stretch.ground.iter().filter(|ground| ground.did == Did::Rolled).collect();
+        let distance_m = |pair: &[&Event]| pair[1].distance_m - pair[0].distance_m;
+        // Another row may have a rest at the same distance, by the wheel.
+        let is_between = |rest: &PassedGround, pair: &[&Event]| {
+            rest.distance_m.start < pair[1].distance_m
+                && pair[0].distance_m <= rest.distance_m.end
+                && rest.time_ms.start <= pair[1].time_ms
+                && pair[0].time_ms <= rest.time_ms.end
+        };
+        let is_spacing = |pair: &&[&Event]| distance_m(pair) > 0.0 && !rests.iter().any(|rest| is_between(rest, pair));
+        spacings.extend(plants.windows(2).filter(is_spacing).map(|pair| 1000.0 * distance_m(pair)));
     }
     spacings
 }

@@ -297,9 +297,9 @@ fn a_damaged_position_adds_no_ground() {
     let worked = |log: &[Entry]| {
         let summary =
             Summary::of(&Job::read(log, &Wanted::default()), &Stand { row_spacing_mm: 500.0, spacing_mm: None });
-        [summary.worked_m, summary.weeded_m]
+        (summary.worked_m, summary.weeded_m, summary.missing)
     };
-    let [worked_m, weeded_m] = worked(&log);
+    let (worked_m, weeded_m, missing) = worked(&log);
     for at in (0..log.len()).step_by(7) {
         let Some((before, position)) = log[at].text.split_once(" pos=") else { continue };
         let (position, behind) = position.split_once(' ').unwrap_or((position, ""));
@@ -307,10 +307,12 @@ fn a_damaged_position_adds_no_ground() {
             let mut log = log.clone();
             let damaged = position.parse::<i32>().expect("it is a number") + by;
             log[at].text = format!("{before} pos={damaged} {behind}");
-            let [found_m, found_weeded_m] = worked(&log);
+            let (found_m, found_weeded_m, found_missing) = worked(&log);
             // At most the ground between the statuses around it is unknown, and that up to a swing.
             assert!((-0.5..0.1).contains(&(found_m - worked_m)), "{}: {by}: {found_m} of {worked_m}", log[at].text);
             assert!((-0.5..0.1).contains(&(found_weeded_m - weeded_m)), "{}: {by}: {found_weeded_m}", log[at].text);
+            // The damaged detection itself is missing.
+            assert!((missing..=missing + 1).contains(&found_missing), "{}: {by}: {found_missing}", log[at].text);
         }
     }
 }

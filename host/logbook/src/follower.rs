@@ -161,6 +161,19 @@ pub enum Followed {
     Unread,
 }
 
+impl Followed {
+    /// Whether it is a line of the machine that this version cannot read: damaged, or of another firmware.
+    pub fn is_unread(&self) -> bool {
+        matches!(self, Self::Unread | Self::Event(EventLine::Newer { .. }))
+    }
+}
+
+/// The number of such lines in a log.
+pub fn unread(log: &[Entry]) -> usize {
+    let mut follower = Follower::default();
+    log.iter().filter(|entry| follower.take(entry).is_unread()).count()
+}
+
 fn position(event: &EventLine) -> Option<i32> {
     match *event {
         EventLine::Detection { position, .. }

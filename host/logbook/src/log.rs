@@ -58,7 +58,7 @@ impl Kind {
     /// Whether a log that is continued may go on with such a line. Its clock then begins again. A hold is typed before the
     /// machine has answered.
     fn may_begin(self) -> bool {
-        !matches!(self, Self::Setting | Self::Example | Self::Status | Self::Event | Self::Gps | Self::GpsDamaged)
+        matches!(self, Self::Connected | Self::Started | Self::Lost | Self::Command | Self::Answer | Self::Antenna)
     }
 }
 

@@ -26,7 +26,6 @@ use field::wiring;
 use files::bounded_file;
 use std::collections::VecDeque;
 use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{Seek, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc;
@@ -405,38 +404,36 @@ fn terminal(link: Option<&Path>) -> Result<Pty> {
 struct EepromFile {
     path: PathBuf,
     /// Locked: two virtual Unos would overwrite what the other has saved.
-    file: File,
+    _lock: File,
     content: Vec<u8>,
 }
 
 impl EepromFile {
     /// Opens it; a file that does not exist yet is an erased EEPROM.
     fn open(path: PathBuf) -> Result<EepromFile> {
-        let content = match bounded_file::bytes(&path) {
-            Ok(content) if content.len() != EEPROM_BYTES => {
-                let (path, bytes) = (path.display(), content.len());
-                bail!("{path} has {bytes} bytes: a file that keeps the EEPROM has {EEPROM_BYTES}")
-            }
-            Err(error) if error.is_absence() => None,
-            read => Some(read.with_context(|| unusable(&path))?),
-        };
+        let is_new = !path.exists();
         let opened = OpenOptions::new().write(true).create(true).truncate(false).open(&path);
-        let file = opened.with_context(|| unusable(&path))?;
-        if matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
+        let lock = opened.with_context(|| unusable(&path))?;
+        if matches!(lock.try_lock(), Err(TryLockError::WouldBlock)) {
             bail!("another virtual Uno keeps its EEPROM in {}: name another file by --eeprom", path.display());
         }
-        let mut opened = EepromFile { path, file, content: content.unwrap_or_default() };
-        if opened.content.is_empty() {
-            opened.keep(vec![0xFF; EEPROM_BYTES])?;
+        if is_new {
+            let mut file = EepromFile { path, _lock: lock, content: Vec::new() };
+            file.keep(vec![0xFF; EEPROM_BYTES])?;
+            return Ok(file);
         }
-        Ok(opened)
+        let content = bounded_file::bytes(&path).with_context(|| unusable(&path))?;
+        if content.len() != EEPROM_BYTES {
+            let (path, bytes) = (path.display(), content.len());
+            bail!("{path} has {bytes} bytes: a file that keeps the EEPROM has {EEPROM_BYTES}")
+        }
+        Ok(EepromFile { path, _lock: lock, content })
     }
 
     /// Writes it where the content has changed.
     fn keep(&mut self, content: Vec<u8>) -> Result<()> {
         if content != self.content {
-            let written = self.file.rewind().and_then(|()| self.file.write_all(&content));
-            written.with_context(|| unusable(&self.path))?;
+            std::fs::write(&self.path, &content).with_context(|| unusable(&self.path))?;
             self.content = content;
         }
         Ok(())

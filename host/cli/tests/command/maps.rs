@@ -69,3 +69,24 @@ fn without_the_machine_s_settings_nothing_is_counted() {
     assert_eq!(counted[0]["count"]["worked_m"], 0.0);
     assert!(said.contains("the log lacks the settings"), "{said}");
 }
+
+#[test]
+fn damaged_lines_are_counted_and_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let lines = [
+        "0,connected,0.2.0",
+        "0,setting,ticks_per_m=2000",
+        "0,antenna,beam_ahead_mm=50000000 beam_right_mm=0 delay_ms=0",
+        "100,status,state=work tool=in pos=0 speed_mm_s=0 windows=0 unseen_mm=0",
+        "200,status,state=work tool=in pos=10",
+        "250,event,plant pos=1010 votes=-3 spacing=1000 delay=600 hold=400 actuation=1000",
+        "260,event,plant pos=110100 votes=3 spacing=1000 delay=600 hold=400 actuation=1000",
+        "300,status,state=work tool=in pos=1010 speed_mm_s=0 windows=0 unseen_mm=0",
+    ];
+    fs::write(folder.path().join("log.csv"), format!("time_ms,kind,line\n{}\n", lines.join("\n"))).unwrap();
+    let output = weeder(folder.path(), &["map", "log.csv", "-o", "map.geojson", "--json"]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let counted: serde_json::Value = serde_json::from_slice(&output.stdout).expect("it is JSON");
+    assert_eq!(counted[0]["count"]["plants"], 0);
+    assert!(said.contains("log.csv: 4 lines left out"), "{said}");
+}

@@ -13,6 +13,10 @@ use std::ops::Range;
 /// the stretch's beginning or end.
 const STANDING_MS: f64 = 1000.0;
 
+/// An event lies at most so far from the last status, in metres, and as far as the machine rolls meanwhile.
+const EVENT_M: f64 = 3.0;
+const EVENT_M_S: f64 = 5.0;
+
 /// A status of the wheel.
 #[derive(Clone, Copy)]
 pub(super) struct Rolled {
@@ -141,7 +145,14 @@ impl Reading {
         }
     }
 
-    pub(super) fn event(&mut self, entry: &Entry, event: &EventLine, follower: &Follower) {
+    /// Whether an event at this distance can be where the machine is. One status may have a damaged position.
+    fn is_near(&self, time_ms: f64, m: f64) -> bool {
+        let reach_m = |from: &Rolled| EVENT_M + EVENT_M_S * (time_ms - from.time_ms) / 1000.0;
+        self.wheel.is_empty() || self.wheel.iter().rev().take(2).any(|from| (m - from.m).abs() <= reach_m(from))
+    }
+
+    /// Takes an event. Returns false if its position is far from those around it: then it is left out.
+    pub(super) fn event(&mut self, entry: &Entry, event: &EventLine, follower: &Follower) -> bool {
         let metres = |position| follower.mm(position).map(|mm| mm / 1000.0);
         let (kind, position, width_mm) = match *event {
             EventLine::Detection { class, position, votes, hold, .. } => {
@@ -149,6 +160,9 @@ impl Reading {
             }
             EventLine::Guarded { position } => (EventKind::Guarded, position, 0.0),
             EventLine::Swing { out, position } => {
+                if metres(position).is_some_and(|m| !self.is_near(entry.time_ms as f64, m)) {
+                    return false;
+                }
                 let is_at_work = self.last_status.as_ref().is_some_and(|status| status.mode == Mode::Work)
                     || self.ground.last().is_some_and(|passed| passed.did != Did::Rolled);
                 if let Some(at_m) = metres(position).filter(|_| is_at_work) {
@@ -171,14 +185,18 @@ impl Reading {
                 {
                     self.turn_to(Did::Rolled, m, entry.time_ms);
                 }
-                return;
+                return true;
             }
-            _ => return,
+            _ => return true,
         };
-        let Some(at_m) = metres(position) else { return };
+        let Some(at_m) = metres(position) else { return true };
+        if !self.is_near(entry.time_ms as f64, at_m + width_mm / 1000.0) {
+            return false;
+        }
         // A detection is its middle.
         let mark = Event::mark(kind, entry.text.clone(), entry.number, entry.time_ms as f64, at_m + width_mm / 2000.0);
         self.events.push(Event { width_mm, ..mark });
+        true
     }
 
     /// Takes a command that the machine has carried out.

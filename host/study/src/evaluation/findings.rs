@@ -118,7 +118,7 @@ impl Analysis {
         let most = self.records.iter().filter_map(percent).fold(0.0, f64::max);
         let worst = self.records.iter().filter(|plot| percent(plot).is_some_and(|percent| percent >= most));
         let place = |plot: &PlotRecord| {
-            format!("replication {}, {} km/h, {} cm", plot.replication, plot.speed_km_h, plot.spacing_cm)
+            format!("replication {}, {} km/h, {} cm", plot.replication, visible(plot.speed_km_h, 2), plot.spacing_cm)
         };
         let worst: Vec<String> = worst.map(place).collect();
         let kind = if worst.len() == 1 { "a plot" } else { "each of these plots" };
