@@ -213,7 +213,7 @@ impl Receiver {
         let last = self.moment?;
         let days = ((arrived_ms - last.ahead_ms() - time_ms as f64) / DAY_MS as f64).round() as i64;
         let utc_ms = days * DAY_MS + time_ms;
-        ((arrived_ms - utc_ms as f64 - last.ahead_ms()).abs() <= LONGEST_DELAY_MS).then_some(utc_ms)
+        ((arrived_ms - utc_ms as f64 - last.ahead_ms()).abs() < LONGEST_DELAY_MS).then_some(utc_ms)
     }
 
     fn no_fix(&mut self) {

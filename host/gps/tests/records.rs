@@ -230,8 +230,8 @@ fn a_change_of_the_wheel_begins_a_new_stretch() {
     let mut log = whole();
     let set = vec![
         (Kind::Command, "set ticks_per_m 1000"),
-        (Kind::Command, "label plant"),
         (Kind::Answer, "ok"),
+        (Kind::Command, "label plant"),
         (Kind::Event, "swing tool=out pos=30100"),
         (Kind::Answer, "error: there is no object to label"),
     ];
@@ -244,6 +244,21 @@ fn a_change_of_the_wheel_begins_a_new_stretch() {
         plants[2] - plants[1]
     };
     assert!((spacing_m(&one.events) - 0.5).abs() < 1e-9 && (spacing_m(&other.events) - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn a_command_whose_answer_is_lost_makes_the_wheel_unknown() {
+    let mut log = whole();
+    // The answer was an error, because the machine was at work.
+    insert(&mut log, vec![(Kind::Command, "set wheel_mm 800"), (Kind::Command, "status"), (Kind::Answer, "ok")]);
+    let job = Job::read(&log, &Wanted::default());
+    assert!(job.without_wheel > 0 && job.stretches.len() == 1, "{} {}", job.without_wheel, job.stretches.len());
+    // A hold does not wait for the answer before it.
+    let mut log = whole();
+    let held = [(Kind::Command, "set wheel_mm 800"), (Kind::Command, "hold")];
+    let answers = [(Kind::Answer, "error: hold first"), (Kind::Answer, "ok")];
+    insert(&mut log, [held, answers].concat());
+    assert_eq!(Job::read(&log, &Wanted::default()).without_wheel, 0);
 }
 
 #[test]
@@ -353,8 +368,8 @@ fn a_label_lies_where_the_last_object_does_and_a_refused_one_is_none() {
     let mut log = whole();
     let said = vec![
         (Kind::Command, "label weed"),
-        (Kind::Command, "label plant"),
         (Kind::Answer, "ok"),
+        (Kind::Command, "label plant"),
         (Kind::Answer, "error: there is no object to label"),
     ];
     insert(&mut log, said);

@@ -9,6 +9,7 @@
 
 use crate::log::{Entry, Kind};
 use control::say::command::{Action, Command};
+use link::session::HOLD;
 use link::settings::{Setting, Settings, shown};
 use link::{ConsoleLine, EventLine, Status};
 use std::collections::VecDeque;
@@ -99,6 +100,20 @@ impl InUse {
     fn know(&mut self, setting: Setting, is_known: bool) {
         self.unknown.retain(|&unknown| unknown != setting);
         self.unknown.extend((!is_known).then_some(setting));
+    }
+
+    /// Takes a command whose answer is missing.
+    fn doubt(&mut self, line: &str) {
+        match link::command(line) {
+            Ok(Command { action: Action::Set, setting, .. }) => {
+                self.know(setting, false);
+                if setting.is_of_the_wheel() {
+                    self.know(Setting::TicksPerM, false);
+                }
+            }
+            Ok(Command { action: Action::Defaults | Action::Revert, .. }) => self.forget(),
+            _ => {}
+        }
     }
 
     /// Takes a command that the machine has carried out.
@@ -220,6 +235,10 @@ impl Follower {
                 Followed::Event(event)
             }),
             Kind::Command => {
+                if entry.text != HOLD {
+                    // It is typed after the answers before it: this log lacks them.
+                    self.unanswered.drain(..).for_each(|lost| self.in_use.doubt(&lost.text));
+                }
                 self.unanswered.push_back(entry.clone());
                 Followed::Other
             }

@@ -9,7 +9,7 @@
 use crate::disk::Disk;
 use files::bounded_file::RECORDED_MIB;
 use files::{CsvTable, FileError, in_a_line, whole_file};
-use link::session::Happening;
+use link::session::{HOLD, Happening};
 use same_file::Handle;
 use std::fs::{File, OpenOptions};
 use std::io::{self, ErrorKind, Read, Seek, SeekFrom, Write};
@@ -57,8 +57,11 @@ pub enum Kind {
 impl Kind {
     /// Whether a log that is continued may go on with such a line. Its clock then begins again. A hold is typed before the
     /// machine has answered.
-    fn may_begin(self) -> bool {
-        matches!(self, Self::Connected | Self::Started | Self::Lost | Self::Command | Self::Answer | Self::Antenna)
+    fn may_begin(self, text: &str) -> bool {
+        match self {
+            Self::Command => text == HOLD,
+            _ => matches!(self, Self::Connected | Self::Started | Self::Lost | Self::Antenna),
+        }
     }
 }
 
@@ -329,7 +332,7 @@ pub fn parse(path: &Path, mut text: Vec<u8>) -> Result<Vec<Entry>, FileError> {
                 line.error(format!("kind is `{}`: it has to be one of {known}", line.text("kind")))
             })?;
             let time_ms = line.value("time_ms", "a whole number of milliseconds")?;
-            if time_ms < last_ms && !kind.may_begin() {
+            if time_ms < last_ms && !kind.may_begin(line.text("line")) {
                 let why =
                     format!("time_ms goes back from {last_ms} to {time_ms}: lines have to stand as they were recorded");
                 return Err(line.error(why));

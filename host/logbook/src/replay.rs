@@ -394,13 +394,14 @@ mod tests {
     #[test]
     fn answers_belong_to_commands_in_their_order() {
         // `hold` does not wait for the previous answer.
-        let log = log(&[
-            (2, Kind::Command, "set margin_mm 9999"),
-            (2, Kind::Command, "start"),
-            (3, Kind::Answer, "error: margin_mm takes a whole number from 0 to 200"),
-            (3, Kind::Answer, "ok"),
-        ]);
-        let difference = replay(&log).unwrap().difference.expect("the start was taken");
+        let hold = (2, Kind::Command, "hold");
+        let answers = [(3, Kind::Answer, "error: settings contradict"), (3, Kind::Answer, "ok")];
+        let start = (2, Kind::Command, "start");
+        assert_eq!(replay(&log(&[start, hold, answers[0], answers[1]])).unwrap().difference, None, "refused");
+        // The other lines wait for it: of the first one, the answer is missing.
+        let difference =
+            replay(&log(&[(2, Kind::Command, "status"), start, answers[1], answers[1]])).unwrap().difference;
+        let difference = difference.expect("the start was taken");
         assert!(difference.replayed.contains("swing tool=in"), "{difference}");
     }
 }

@@ -18,6 +18,8 @@ use std::ops::Range;
 /// Rolling back farther than this in hold leads to another row, in metres.
 pub const NEXT_ROW_M: f64 = 2.0;
 
+const FASTEST_MM_S: f64 = 5000.0;
+
 /// A stretch of work.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Worked {
@@ -127,7 +129,8 @@ pub fn worked(log: &[Entry]) -> Vec<Worked> {
         if let (Followed::Event(_), Some((_, time_ms, mm, speed_mm_s))) = (&followed, last) {
             let since_ms = entry.time_ms.saturating_sub(time_ms) as f64;
             if since_ms <= WHEEL_GAP_MS {
-                now_mm = Some(mm + speed_mm_s * since_ms / 1000.0);
+                // No machine rolls faster: the status is damaged.
+                now_mm = Some(mm + speed_mm_s.clamp(-FASTEST_MM_S, FASTEST_MM_S) * since_ms / 1000.0);
                 open.iter_mut().for_each(|open| open.take(entry.time_ms, now_mm, speed_mm_s, true));
             } else {
                 gaps += u32::from(open.is_some());

@@ -3,6 +3,7 @@
 use super::{Did, Event, EventKind, PassedGround};
 use crate::receiver::Fix;
 use control::say::command::Action;
+use link::settings::Setting;
 use link::{Class, EventLine, Mode, Status};
 use logbook::follower::{Follower, is_gap};
 use logbook::log::{Entry, Kind};
@@ -16,6 +17,9 @@ const STANDING_MS: f64 = 1000.0;
 /// An event lies at most so far from the last status, in metres, and as far as the machine rolls meanwhile.
 const EVENT_M: f64 = 3.0;
 const EVENT_M_S: f64 = 5.0;
+
+/// A detection has at most `max_width_mm`, and some more with slip.
+const MORE: f64 = 1.25;
 
 /// A status of the wheel.
 #[derive(Clone, Copy)]
@@ -190,7 +194,9 @@ impl Reading {
             _ => return true,
         };
         let Some(at_m) = metres(position) else { return true };
-        if !self.is_near(entry.time_ms as f64, at_m + width_mm / 1000.0) {
+        // Wider ones raise an alarm.
+        let most_mm = MORE * f64::from(follower.in_use().settings().get(Setting::MaxWidthMm));
+        if width_mm > most_mm || !self.is_near(entry.time_ms as f64, at_m + width_mm / 1000.0) {
             return false;
         }
         // A detection is its middle.

@@ -6,6 +6,7 @@ use crate::log::{Entry, Kind};
 use control::say::command::{Action, Command};
 use files::in_a_line;
 use link::examples::{Taught, taught};
+use link::session::HOLD;
 use link::settings::{Setting, Settings, shown};
 use link::{ConsoleLine, EventLine, Mode, Status};
 use std::collections::VecDeque;
@@ -79,6 +80,10 @@ impl<'a> Stretch<'a> {
                     event => happened.push((entry, Happened::Event(event))),
                 },
                 Kind::Command => {
+                    if entry.text != HOLD {
+                        // It is typed after the answers before it: this log lacks them.
+                        unanswered.clear();
+                    }
                     unanswered.push_back(happened.len());
                     happened.push((entry, Happened::Command(link::command(&entry.text).ok())));
                 }
