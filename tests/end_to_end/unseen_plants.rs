@@ -43,3 +43,14 @@ fn a_plant_that_is_not_seen_is_weeded_where_no_spacing_is_set() {
     assert!(!is_out_at(&mut run, 1600.0));
     assert_eq!(run.events("guarded"), [""; 0]);
 }
+
+#[test]
+fn a_stalk_close_behind_unseen_ground_has_its_stem_zone_behind_it() {
+    // The ground before the start is unseen. The gap behind it is narrower than the merging gap, so the stalk may be the end of a plant.
+    let row = Row::new([(74.0, 4.0), (1000.0, 150.0)].map(|(place, width)| Canopy::plant(place, width)).to_vec());
+    let commands = ["set top_speed_mm_s 700", "set merge_gap_mm 82", "set stem_zone_mm 110"];
+    let mut run = Run::begin(pass(row.expect("they stand apart"), steady(mm_s(1.0), 1500.0)), &commands);
+    // Half of the zone ends 131 mm from the start, and the margin 50 mm behind it.
+    let found = [155.0, 200.0].map(|place_mm| is_out_at(&mut run, place_mm));
+    assert_eq!(found, [true, false], "{:#?}", run.lines());
+}
