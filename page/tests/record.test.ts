@@ -109,7 +109,8 @@ test("a file that is no log is told, and so is one without a machine", async () 
 test("a log that lacks the settings behind revert says from when on it is not drawn", async () => {
     const status = (ms: number) => `${ms},status,state=work tool=in pos=${ms} speed_mm_s=500 windows=0 unseen_mm=0`;
     const reverted = ["2000,command,revert", "3000,answer,ok"];
-    const lines = ["time_ms,kind,line", "0,connected,0.2.0", status(0), status(2000), ...reverted, status(9000)];
+    const connected = ["0,connected,0.2.0", "0,setting,ticks_per_m=2000"];
+    const lines = ["time_ms,kind,line", ...connected, status(0), status(2000), ...reverted, status(9000)];
     writeFileSync("build/files/reverted.csv", `${lines.join("\n")}\n`);
     const opened = await openLog("build/files/reverted.csv");
     const said = (await inView(opened.page, "log-said").textContent()) ?? "";

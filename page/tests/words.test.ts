@@ -22,6 +22,7 @@ const SMALL = { width: 360, height: 640 };
 /** A log with an alarm. */
 const LOG = Buffer.from(`time_ms,kind,line
 0,connected,0.2.0
+0,setting,ticks_per_m=2000
 0,status,state=work tool=in pos=0 speed_mm_s=500 windows=0 unseen_mm=0
 900,event,plant pos=700 votes=3 spacing=1000 delay=680 hold=540 actuation=1220
 9000,status,state=work tool=in pos=9000 speed_mm_s=500 windows=0 unseen_mm=0

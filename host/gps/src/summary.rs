@@ -120,7 +120,7 @@ impl Summary {
         }
         let (mut work_ms, mut record_ms) = (0, 0);
         for stretch in &job.stretches {
-            record_ms = stretch.time_ms.end.saturating_sub(stretch.time_ms.start).saturating_add(record_ms);
+            record_ms += stretch.time_ms.end.saturating_sub(stretch.time_ms.start);
             for ground in stretch.ground.iter().filter(|ground| ground.did != Did::Rolled) {
                 let length_m = ground.distance_m.end - ground.distance_m.start;
                 summary.worked_m += length_m;

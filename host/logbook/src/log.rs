@@ -333,8 +333,7 @@ pub fn parse(path: &Path, mut text: Vec<u8>) -> Result<Vec<Entry>, FileError> {
             })?;
             let time_ms = line.value("time_ms", "a whole number of milliseconds")?;
             if time_ms < last_ms && !kind.may_begin(line.text("line")) {
-                let why =
-                    format!("time_ms goes back from {last_ms} to {time_ms}: lines have to stand as they were recorded");
+                let why = format!("time_ms goes back from {last_ms} to {time_ms}: lines have to stand as recorded");
                 return Err(line.error(why));
             }
             last_ms = time_ms;

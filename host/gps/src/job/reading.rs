@@ -152,7 +152,8 @@ impl Reading {
     /// Whether an event at this distance can be where the machine is. One status may have a damaged position.
     fn is_near(&self, time_ms: f64, m: f64) -> bool {
         let reach_m = |from: &Rolled| EVENT_M + EVENT_M_S * (time_ms - from.time_ms) / 1000.0;
-        self.wheel.is_empty() || self.wheel.iter().rev().take(2).any(|from| (m - from.m).abs() <= reach_m(from))
+        let last = &self.wheel[self.wheel.len().saturating_sub(2)..];
+        last.is_empty() || last.iter().any(|from| (m - from.m).abs() <= reach_m(from))
     }
 
     /// Takes an event. Returns false if its position is far from those around it: then it is left out.
