@@ -326,10 +326,11 @@ mod tests {
 480,event,warning name=no_plants
 490,lost,pulled
 495,connected,0.2.0
+495,setting,ticks_per_m=2000
 496,status,state=hold tool=out pos=5 speed_mm_s=0 windows=0 unseen_mm=400
 ";
 
-    const BEGIN: &str = "time_ms,kind,line\n0,connected,0.2.0\n";
+    const BEGIN: &str = "time_ms,kind,line\n0,connected,0.2.0\n0,setting,ticks_per_rev=2400\n0,setting,wheel_mm=400\n";
 
     /// What `get` answers about the wheel and the tool.
     const SETTINGS: &str = "1300,answer,ticks_per_rev=2400
@@ -387,9 +388,9 @@ mod tests {
 
     #[test]
     fn ground_is_drawn_by_the_wheel_of_its_time() {
-        let command = |line: &str, answer: &str| format!("1100,command,{line}\n1200,answer,{answer}\n");
+        let command = |line: &str, answer: &str| format!("1100,command,{line}\n1100,answer,{answer}\n");
         let set = command("set ticks_per_m 1000", "ok");
-        let shown_ticks = "\"ticks_per_m=1000 from 0 to 20000, default 0, not saved\"\n1200,answer,ok";
+        let shown_ticks = "\"ticks_per_m=1000 from 0 to 20000, default 0, not saved\"\n1100,answer,ok";
         let nominal_mm = |wheel_mm: f64| 500.0 + 1000.0 * std::f64::consts::PI * wheel_mm / 2400.0;
         for (lines, last_mm) in [
             (String::new(), 1000.0),
@@ -457,13 +458,14 @@ mod tests {
     #[test]
     fn statuses_close_together_are_left_out_and_lines_keep_their_numbers() {
         let statuses: String = (0..10).map(|number| status(100 * number, "in", 1000 * number)).collect();
-        let log = format!("{BEGIN}{statuses}0,connected,0.2.0\n{}", status(50, "in", 0));
+        let wheel = "0,setting,ticks_per_m=2000\n";
+        let log = format!("{BEGIN}{statuses}0,connected,0.2.0\n{wheel}{}", status(50, "in", 0));
         let picture = shown(&log, 100);
         let times: Vec<f64> = rows::<3>(&picture, SPEEDS).iter().map(|speed| speed[1]).collect();
         // The second session goes on behind the first.
         assert_eq!(times, [0.0, 300.0, 600.0, 900.0, 950.0]);
         assert_eq!(picture["timeMs"], 950);
         let wrong = shown(&format!("{log}1,gossip,hello\n"), 100);
-        assert!(wrong["problem"].as_str().is_some_and(|problem| problem.contains("line 15")), "{wrong}");
+        assert!(wrong["problem"].as_str().is_some_and(|problem| problem.contains("line 18")), "{wrong}");
     }
 }
