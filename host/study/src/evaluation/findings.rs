@@ -4,7 +4,7 @@ use super::report::times;
 use super::table::LEAVE_OUT;
 use super::{Analysis, PlotRecord, Response, ResponseAnalysis, Treatment, nominal};
 use crate::statistics::{OddsTerm, SIGNIFICANCE, Share, Term, grouped, probability};
-use crate::table::{distinct, in_words, list, visible};
+use crate::table::{distinct, in_words, list, short, visible};
 use field::counted;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -118,7 +118,9 @@ impl Analysis {
         let most = self.records.iter().filter_map(percent).fold(0.0, f64::max);
         let worst = self.records.iter().filter(|plot| percent(plot).is_some_and(|percent| percent >= most));
         let place = |plot: &PlotRecord| {
-            format!("replication {}, {} km/h, {} cm", plot.replication, visible(plot.speed_km_h, 2), plot.spacing_cm)
+            // More digits would only seem to be measured.
+            let km_h = short((1000.0 * plot.speed_km_h).round() / 1000.0);
+            format!("replication {}, {km_h} km/h, {} cm", plot.replication, plot.spacing_cm)
         };
         let worst: Vec<String> = worst.map(place).collect();
         let kind = if worst.len() == 1 { "a plot" } else { "each of these plots" };
