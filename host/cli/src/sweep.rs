@@ -195,19 +195,20 @@ fn about(sweep: &Sweep) -> String {
     format!("{text}, {}.", sweep.controller.title())
 }
 
-/// All results of all points, by the names of the file's columns. A missing result is null. Where an axis has speed or spacing, its
-/// value replaces that of the sweep.
+/// All results of all points, by the names of the file's columns. A missing result is null, and so are speed and spacing where an
+/// axis has them.
 fn in_json(sweep: &Sweep, points: &[Point]) -> Value {
     let point = |point: &Point| {
         let values = place(point).chain(point.results).map(Value::from);
         Map::from_iter(columns(sweep).map(str::to_owned).zip(values))
     };
+    let unless_axis = |name: &str, value: f64| (!columns(sweep).any(|column| column == name)).then_some(value);
     json!({
         "field": sweep.field,
         "seed": sweep.seed,
         "controller": sweep.controller.title(),
-        "speed_km_h": sweep.speed_km_h,
-        "spacing_cm": sweep.spacing_cm,
+        "speed_km_h": unless_axis("speed", sweep.speed_km_h),
+        "spacing_cm": unless_axis("spacing", sweep.spacing_cm),
         "points": points.iter().map(point).collect::<Vec<_>>(),
     })
 }

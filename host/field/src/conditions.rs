@@ -326,6 +326,8 @@ impl Conditions {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::row::{Canopy, Row};
+    use crate::tool_path::share_from_row_to_row;
 
     fn parse(text: &str) -> Result<Conditions, String> {
         Conditions::parse(Path::new("field.toml"), text).map_err(|error| error.to_string())
@@ -335,6 +337,29 @@ mod tests {
     fn every_default_and_every_preset_is_within_the_ranges() {
         for preset in presets() {
             assert!(Conditions::preset(preset).is_some_and(|parsed| parsed.is_ok()), "{preset}");
+        }
+    }
+
+    #[test]
+    fn a_row_uses_what_changes_its_pass_or_its_totals() {
+        let shown = |conditions: &Conditions| {
+            let row = Row::new(vec![Canopy::plant(500.0, 150.0)]).unwrap();
+            let share = share_from_row_to_row(conditions, 0.5);
+            // The slip is that of the motion, which the caller makes.
+            format!("{:?} {} {share}", conditions.pass_at_speed(row, 500.0, 1), conditions.ground.slip_percent)
+        };
+        let default = Conditions::default();
+        for (parameter, value) in default.values() {
+            let values = [parameter.least, parameter.greatest, value - 1.0, value + 1.0, value + 0.1, 100.0];
+            let changed = values.into_iter().filter_map(|value| {
+                let mut changed = default.clone();
+                changed.set(parameter.name, value).is_ok().then_some(changed)
+            });
+            let changed: Vec<Conditions> = changed.filter(|changed| *changed != default).collect();
+            assert!(!changed.is_empty(), "{} has another value", parameter.name);
+            let is_used = changed.iter().any(|changed| shown(changed) != shown(&default));
+            let is_unused = |changed: &Conditions| changed.unused_by_a_row() == [parameter.name];
+            assert_eq!(changed.iter().all(is_unused), !is_used, "{}", parameter.name);
         }
     }
 

@@ -24,15 +24,17 @@ pub const WHEEL_GAP_MS: f64 = 2000.0;
 /// The wheel stands while it rolls less than this, in metres.
 pub const STANDING_M: f64 = 0.005;
 
-/// A machine rolls at most this far between two statuses, in metres, and in metres for each second. The clocks of some
-/// computers stand still during their sleep.
+/// No machine rolls faster, in metres per second.
+pub const FASTEST_M_S: f64 = 5.0;
+
+/// A machine rolls at most this far between two statuses, in metres, and by [`FASTEST_M_S`]. The clocks of some computers stand
+/// still during their sleep.
 const AWAKE_M: f64 = 1.0;
-const AWAKE_M_S: f64 = 5.0;
 
 /// Whether the wheel has rolled this far between two statuses, and it is not known when. The work there is unknown.
 pub fn is_gap(time_ms: f64, rolled_m: f64) -> bool {
     let rolled_m = rolled_m.abs();
-    let has_slept = rolled_m > AWAKE_M + AWAKE_M_S * time_ms / 1000.0;
+    let has_slept = rolled_m > AWAKE_M + FASTEST_M_S * time_ms / 1000.0;
     has_slept || (time_ms > WHEEL_GAP_MS && rolled_m > STANDING_M)
 }
 

@@ -8,7 +8,7 @@
 //! The work in a gap of the statuses is unknown ([`is_gap`]). Nothing but the lines of such a stretch is known, and no
 //! time over the gap: the clocks of some computers stand still during their sleep.
 
-use crate::follower::{Followed, Follower, WHEEL_GAP_MS, is_gap};
+use crate::follower::{FASTEST_M_S, Followed, Follower, WHEEL_GAP_MS, is_gap};
 use crate::log::Entry;
 use control::ground::class::Class;
 use link::settings::Setting;
@@ -17,8 +17,6 @@ use std::ops::Range;
 
 /// Rolling back farther than this in hold leads to another row, in metres.
 pub const NEXT_ROW_M: f64 = 2.0;
-
-const FASTEST_MM_S: f64 = 5000.0;
 
 /// A stretch of work.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -129,8 +127,9 @@ pub fn worked(log: &[Entry]) -> Vec<Worked> {
         if let (Followed::Event(_), Some((_, time_ms, mm, speed_mm_s))) = (&followed, last) {
             let since_ms = entry.time_ms.saturating_sub(time_ms) as f64;
             if since_ms <= WHEEL_GAP_MS {
-                // No machine rolls faster: the status is damaged.
-                now_mm = Some(mm + speed_mm_s.clamp(-FASTEST_MM_S, FASTEST_MM_S) * since_ms / 1000.0);
+                // A damaged status may have any speed.
+                let fastest_mm_s = 1000.0 * FASTEST_M_S;
+                now_mm = Some(mm + speed_mm_s.clamp(-fastest_mm_s, fastest_mm_s) * since_ms / 1000.0);
                 open.iter_mut().for_each(|open| open.take(entry.time_ms, now_mm, speed_mm_s, true));
             } else {
                 gaps += u32::from(open.is_some());

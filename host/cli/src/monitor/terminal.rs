@@ -26,7 +26,7 @@ const LOOK: Duration = Duration::from_micros(100);
 /// Longest wait at the end for the answers to a HOLD.
 const LAST_HOLD: Duration = Duration::from_secs(2);
 
-/// Whether the terminal can show a full screen. Without its name, too, nobody knows.
+/// Whether the terminal can show a full screen: its name is known, and not `dumb`.
 pub fn has_screen() -> bool {
     !cfg!(unix) || env::var("TERM").is_ok_and(|name| !matches!(name.as_str(), "" | "dumb"))
 }

@@ -49,6 +49,11 @@ fn the_json_agrees_with_r_for_the_same_table() {
     let json: Value = serde_json::from_str(&said(Path::new("."), &["evaluate", EXAMPLE, "--json"])).unwrap();
     assert_eq!(json["plots"].as_array().unwrap().len(), 24);
     assert_eq!(json["treatments"].as_array().unwrap().len(), 8);
+    let levels = |of: &str, key: &str| -> Vec<f64> {
+        json[of].as_array().unwrap().iter().filter_map(|one| one[key].as_f64()).collect()
+    };
+    let treated = levels("treatments", "speed_km_h");
+    assert!(levels("plots", "speed_level_km_h").iter().all(|level| treated.contains(level)), "{treated:?}");
     let weeding = &json["responses"][1];
     assert_eq!(weeding["response"], "weeding_efficiency");
     let close = |value: &Value, r: f64| {

@@ -83,11 +83,13 @@ fn a_trial_gives_programs_its_plots() {
     let value: Value = serde_json::from_str(&words).unwrap();
     assert_eq!(value["plots"].as_array().unwrap().len(), 2 * 4);
     assert_eq!(value["plots"][0]["record"]["damaged"], 0);
+    assert_eq!((&value["field"], &value["seed"]), (&"small.toml".into(), &1.into()));
     for plot in value["plots"].as_array().unwrap() {
         let budget = plot["loss_budget_percent"].as_object().unwrap();
         let sum: f64 = budget.values().map(|percent| percent.as_f64().unwrap()).sum();
         assert!(budget.len() == 7 && (sum - 100.0).abs() < 1e-6, "{plot}");
         assert_eq!(budget["weeded"], plot["in_row_weeded_percent"]);
+        assert!(plot["plot_weeds_before"].as_u64() >= plot["in_row_weeds_before"].as_u64(), "{plot}");
     }
 }
 
@@ -188,6 +190,7 @@ fn a_field_without_plants_has_no_share_of_zones_reached() {
     let field = ["--field", "none.toml", "--spacing", "500", "--json"];
     let words = said(folder.path(), &[&["sweep", "--x", "plot.row_m=2..2:1"][..], &field].concat());
     let value: Value = serde_json::from_str(&words).unwrap();
+    assert_eq!((&value["field"], &value["spacing_cm"]), (&"none.toml".into(), &500.0.into()));
     let point = &value["points"][0];
     assert_eq!((&point["plant_damage"], &point["zones_reached"]), (&Value::Null, &Value::Null), "{point}");
 }

@@ -119,6 +119,8 @@ fn an_empty_uno_is_flashed_through_optiboot_and_answers() {
     let bootloader = optiboot(folder.path());
     arguments.extend([&bootloader, Path::new("--link"), &link, Path::new("--eeprom"), &eeprom]);
     let uno = virtual_uno(&arguments);
+    let same = command(&["virtual-uno", "--stand", "--eeprom"]).arg(&eeprom).output().unwrap();
+    assert_fails(&same, "another virtual Uno keeps its EEPROM in");
     flash(&link, &[]);
 
     assert_talks(&link);

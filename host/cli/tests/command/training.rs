@@ -64,6 +64,7 @@ fn answers_are_printed_as_json_for_scripts() {
     assert_eq!(output.status.code(), Some(1));
     let rows: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!((&rows[0]["answer"], &rows[0]["label"]), (&"weed".into(), &"plant".into()));
+    assert_eq!(rows[1]["detection"], 2);
     assert_eq!((&rows[1]["answer"], &rows[1]["label"]), (&"plant".into(), &serde_json::Value::Null));
     assert!(rows[1]["votes_plant"].as_u64() > rows[1]["votes_weed"].as_u64(), "{rows}");
 }
@@ -109,6 +110,11 @@ fn a_k_that_is_not_the_machine_s_default_is_told() {
         let said = printed(&weeder(folder.path(), &["train", "objects.csv", "--k", k]), 0);
         assert_eq!(said.contains("`set k 1`, then `save`"), is_told, "{said}");
     }
+    let output = weeder(folder.path(), &["train", "objects.csv", "--json"]);
+    let trained: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let counted = &trained["before_condensing"];
+    assert_eq!((&counted["plants_as"]["plant"], &counted["weeds_as"]["weed"]), (&3.into(), &3.into()), "{trained}");
+    assert_eq!(counted["plants_taken_for_weeds_share"]["of"], 3);
 }
 
 #[test]

@@ -5,7 +5,7 @@ use crate::receiver::Fix;
 use control::say::command::Action;
 use link::settings::Setting;
 use link::{Class, EventLine, Mode, Status};
-use logbook::follower::{Follower, is_gap};
+use logbook::follower::{FASTEST_M_S, Follower, is_gap};
 use logbook::log::{Entry, Kind};
 use logbook::worked::NEXT_ROW_M;
 use std::ops::Range;
@@ -16,7 +16,6 @@ const STANDING_MS: f64 = 1000.0;
 
 /// An event lies at most so far from the last status, in metres, and as far as the machine rolls meanwhile.
 const EVENT_M: f64 = 3.0;
-const EVENT_M_S: f64 = 5.0;
 
 /// A detection has at most `max_width_mm`, and some more with slip.
 const MORE: f64 = 1.25;
@@ -151,7 +150,7 @@ impl Reading {
 
     /// Whether an event at this distance can be where the machine is. One status may have a damaged position.
     fn is_near(&self, time_ms: f64, m: f64) -> bool {
-        let reach_m = |from: &Rolled| EVENT_M + EVENT_M_S * (time_ms - from.time_ms) / 1000.0;
+        let reach_m = |from: &Rolled| EVENT_M + FASTEST_M_S * (time_ms - from.time_ms) / 1000.0;
         let last = &self.wheel[self.wheel.len().saturating_sub(2)..];
         last.is_empty() || last.iter().any(|from| (m - from.m).abs() <= reach_m(from))
     }
