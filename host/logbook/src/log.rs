@@ -58,10 +58,8 @@ impl Kind {
     /// Whether a log that is continued may go on with such a line. Its clock then begins again. A hold is typed before the
     /// machine has answered.
     fn may_begin(self, text: &str) -> bool {
-        match self {
-            Self::Command => text == HOLD,
-            _ => matches!(self, Self::Connected | Self::Started | Self::Lost | Self::Antenna),
-        }
+        let is_held = self == Self::Command && text == HOLD;
+        is_held || matches!(self, Self::Connected | Self::Started | Self::Lost | Self::Antenna)
     }
 }
 
