@@ -165,8 +165,10 @@ export async function offerPorts(page: Page, devices: Device[]): Promise<void> {
         if (!device) throw new Error(`there is no port ${index}`);
         return device;
     };
+    const openings = devices.map(() => 0);
     await page.exposeFunction("deviceOpen", (index: number) => {
         const { refuses } = device(index);
+        openings[index] = (openings[index] ?? 0) + 1;
         if (!refuses) device(index).open();
         return refuses;
     });
@@ -175,9 +177,11 @@ export async function offerPorts(page: Page, devices: Device[]): Promise<void> {
     await page.exposeFunction("deviceWrite", (index: number, bytes: number[]) =>
         device(index).write(Uint8Array.from(bytes)),
     );
-    // Waits some time for input; undefined if the device is gone.
+    // Waits some time for input; null if the device is gone. What comes after another opening is for that.
     await page.exposeFunction("deviceRead", async (index: number) => {
+        const opening = openings[index];
         for (let looks = 0; ; looks++) {
+            if (openings[index] !== opening) return [];
             const bytes = device(index).read();
             if (!bytes) return null;
             if (bytes.length > 0 || looks > 50) return [...bytes];
@@ -232,11 +236,11 @@ function putPorts(count: number): void {
         }
 
         #listen() {
-            this.readable = new ReadableStream({
+            const stream = new ReadableStream<Uint8Array>({
                 pull: async (controller) => {
                     for (;;) {
                         const bytes = await bridge.deviceRead(this.#index);
-                        if (!this.#isOpen) return;
+                        if (this.readable !== stream) return;
                         if (bytes === null) {
                             this.#isOpen = false;
                             this.readable = null;
@@ -253,6 +257,7 @@ function putPorts(count: number): void {
                     if (this.#isOpen) this.#listen();
                 },
             });
+            this.readable = stream;
         }
 
         async setSignals({ dataTerminalReady = false }) {

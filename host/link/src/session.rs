@@ -467,7 +467,7 @@ impl Session {
             self.turn.happened.push(Happening::Answered { number, command, refusal });
         } else if let State::Asking(question) = self.state {
             self.take_first_answer(question, answer, refusal);
-        } else if refusal.is_some() {
+        } else if refusal.is_some() || command == SETTINGS && self.is_doubtful(&answer) {
             // Noise has damaged the line: ask again.
             self.own.insert(command);
         } else if command == SETTINGS {

@@ -28,6 +28,8 @@ pub(super) struct Introduction {
     pub(super) has_held: bool,
     /// The last answer that was taken for one of those.
     pub(super) wrong: Option<LinkError>,
+    /// Whether the settings are asked for once more.
+    pub(super) asks_again: bool,
     pub(super) shown: Vec<String>,
     pub(super) examples: Vec<String>,
     /// Bytes received since the last question.
@@ -89,6 +91,7 @@ impl Session {
         match (question, version) {
             (0, Some(version)) => self.version = version,
             (1, _) => self.introduction.late = 0,
+            (2, _) if self.is_doubtful(&answer) => return,
             (2, _) => self.introduction.shown = answer,
             (3, _) => self.introduction.examples = answer,
             (LAST, _) => return self.connect(answer),
@@ -96,6 +99,14 @@ impl Session {
         }
         let next = if question == 0 && self.introduction.late == 0 { 2 } else { question + 1 };
         self.state = if next == 2 && self.is_bare { State::Ready } else { State::Asking(next) };
+    }
+
+    /// Whether this answer to `get` may have lost lines: it lacks settings, and the answer before it did not. Another
+    /// version lacks them twice.
+    pub(super) fn is_doubtful(&mut self, answer: &[String]) -> bool {
+        let asked_again = self.introduction.asks_again;
+        self.introduction.asks_again = !asked_again && !Shown::by(answer).missing.is_empty();
+        self.introduction.asks_again
     }
 
     /// All first questions are answered, with this status as the last. A newer firmware's may be unknown here.
@@ -141,8 +152,23 @@ pub(crate) fn silence(question: &str, answer: &[String], partial: &str) -> LinkE
 mod tests {
     use super::*;
     use crate::moment::Moment;
+    use crate::settings::Setting;
     use control::alarm::Warning;
     use std::time::Duration;
+
+    /// A machine's answer to the session's question, if it has one: with these settings and this end of its status.
+    fn answer(session: &Session, settings: &str, named: &str) -> String {
+        let said = match session.asked.front().map(|asked| asked.line.as_str()) {
+            None => return String::new(),
+            Some(VERSION) => "weeder 0.2.0\r\n",
+            Some(SETTINGS) => settings,
+            Some(STATUS) => {
+                &format!("state=hold tool=out pos=0 speed_mm_s=0 windows=0 unseen_mm=400\r\nlost=0 jumps=0{named}\r\n")
+            }
+            Some(_) => "",
+        };
+        format!("{said}ok\r\n")
+    }
 
     #[test]
     fn a_warning_lasts_until_the_status_or_the_next_hold_ends_it() {
@@ -161,16 +187,7 @@ mod tests {
                     }
                     _ => None,
                 }));
-                received = match session.asked.front().map_or("", |asked| asked.line.as_str()) {
-                    "" => String::new(),
-                    VERSION => "weeder 0.2.0\r\nok\r\n".to_owned(),
-                    SETTINGS => "k=3 from 1 to 15, default 3, not saved\r\nok\r\n".to_owned(),
-                    STATUS => format!(
-                        "state=hold tool=out pos=0 speed_mm_s=0 windows=0 unseen_mm=400\r\n\
-                         lost=0 jumps=0{named}\r\nok\r\n"
-                    ),
-                    _ => "ok\r\n".to_owned(),
-                };
+                received = answer(&session, "k=3 from 1 to 15, default 3, not saved\r\n", named);
             }
             warnings
         };
@@ -191,5 +208,32 @@ mod tests {
         // A log and a script get the one that stood at the connection as an event.
         let said = cases.iter().map(|(said, ..)| said.trim()).filter(|said| !said.is_empty());
         assert_eq!(events, ["warning name=settings_older"].into_iter().chain(said).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn settings_with_a_lost_line_are_asked_for_once_more() {
+        let line = |setting: Setting| format!("{}={} from 0 to 9\r\n", setting.text(), setting.default());
+        let all: Vec<String> = Setting::all().map(line).collect();
+        // Another version lacks one in every answer.
+        for (damaged, found) in [([true, false], all.len()), ([true, true], all.len() - 1)] {
+            let (mut session, mut now, mut received) = (Session::default(), Moment::default(), String::new());
+            let (mut answers, mut shown) = (damaged.iter().cycle(), Vec::new());
+            session.open(false);
+            for turn in 0..100 {
+                if turn == 50 {
+                    session.command("save", Moment::NEVER).unwrap();
+                }
+                now = now.after(Duration::from_millis(20));
+                for happening in session.turn(now, received.as_bytes()).happened {
+                    if let Happening::Connected { shown: lines, .. } | Happening::Settings(_, lines) = happening {
+                        shown.push(lines.len());
+                    }
+                }
+                let asks = session.asked.front().is_some_and(|asked| asked.line == SETTINGS);
+                let lost = usize::from(asks && *answers.next().unwrap());
+                received = answer(&session, &all[lost..].concat(), "");
+            }
+            assert_eq!(shown, [found; 2]);
+        }
     }
 }
