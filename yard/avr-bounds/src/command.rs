@@ -186,7 +186,7 @@ fn in_words(bounds: &Bounds, held: &[Held], all: bool) -> String {
     }
     // Only `--loops` prints addresses. So the rest of the report is the same for programs with another layout.
     let named_or_where = if all { ":" } else { ", which --loops names." };
-    let loops = &bounds.loops_without_bound;
+    let loops = &bounds.all_loops_without_bound;
     if !loops.is_empty() {
         line(format!("{} loops that end have no bound{named_or_where}", loops.len()));
         loops.iter().filter(|_| all).for_each(|place| line(format!("  {place}")));

@@ -161,7 +161,7 @@ pub fn prove(elf: &Program, budgets: &Budgets) -> Result<Bounds, BoundsError> {
         closed,
         edges,
         turn,
-        loops_without_bound: loops.into_iter().map(|address| code.place(address)).collect(),
+        all_loops_without_bound: loops.into_iter().map(|address| code.place(address)).collect(),
         indirect: indirect(&code),
         functions: functions(&code, &mut timer),
     })

@@ -161,8 +161,9 @@ pub struct Bounds {
     /// The longest turn of the main loop, from `wdr` to `wdr`, without handlers and sleep; `None` if no loop has one.
     /// Without a bound if a loop has it only in a called function.
     pub turn: Option<Longest>,
-    /// Every loop without a bound, except those that the program never leaves.
-    pub loops_without_bound: Vec<Place>,
+    /// Every loop without a bound in the whole program, except those that it never leaves. The budget `loops_without_bound`
+    /// is for those in a turn.
+    pub all_loops_without_bound: Vec<Place>,
     /// Calls and jumps to computed addresses.
     pub indirect: Vec<Indirect>,
     /// Every function that the program reaches.
