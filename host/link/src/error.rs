@@ -62,6 +62,10 @@ pub enum LinkError {
     NotTheWeeder(String),
     #[error("the Uno was reset while it was asked `{0}`: see to its supply, then try again")]
     Restarted(String),
+    #[error(
+        "no two answers to `{0}` are the same: the line is noisy, so take a shorter cable, away from motors, and try again"
+    )]
+    Unsteady(String),
     #[error("the firmware answers `{command}` with `{answer}`")]
     Refused {
         command: String,

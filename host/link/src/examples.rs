@@ -39,8 +39,24 @@ pub enum ExamplesError {
         "{new} examples are new to the machine, which has room for {free} of its {CAPACITY}: leave some out, or use --replace to forget all that are not in the file; nothing was sent"
     )]
     NoRoom { new: usize, free: usize },
-    #[error("{0} of the examples are not on the machine afterwards: try again, and see to the supply if it stays so")]
-    NotTaken(usize),
+    #[error(
+        "{missing} of the examples are not on the machine afterwards{}: try again, and see to the supply if it stays so",
+        surplus_of(.surplus)
+    )]
+    NotTaken {
+        missing: usize,
+        /// The numbers of those that should not be there.
+        surplus: Vec<u16>,
+    },
+}
+
+fn surplus_of(numbers: &[u16]) -> String {
+    let forget: Vec<String> = numbers.iter().map(|number| format!("`forget {number}`")).collect();
+    if forget.is_empty() {
+        String::new()
+    } else {
+        format!(", and others are: have it forget them, by {}", forget.join(", "))
+    }
 }
 
 /// The examples that a machine was taught.
@@ -85,7 +101,7 @@ impl Heading {
 /// # Errors
 /// If the console fails, [`ExamplesError::NoObject`] and [`ExamplesError::OtherTable`].
 pub fn read(link: &mut Link) -> Result<OnMachine, ExamplesError> {
-    let lines = link.ask("examples")?;
+    let lines = link.ask_surely("examples")?;
     let (mut built_in, mut taught) = (Vec::new(), Vec::new());
     for (from_field, number, example) in lines.iter().filter_map(|line| self::taught(line)) {
         if from_field {
@@ -141,12 +157,20 @@ pub fn push(link: &mut Link, wanted: &[Taught], replace: bool) -> Result<Pushed,
     }
     for example in &new {
         // Features from an earlier command may be left in the buffer. Then these are too many, and the firmware refuses
-        // them and clears the buffer. The second try starts with an empty buffer.
-        teach(link, example).or_else(|_| teach(link, example))?;
+        // them and clears the buffer. The second try starts with an empty buffer. Without an answer it may be taught.
+        teach(link, example).or_else(|error| match error {
+            LinkError::Refused { .. } => teach(link, example),
+            error => Err(error),
+        })?;
     }
-    let (missing, _) = compare(wanted, &read(link)?.taught);
-    if !missing.is_empty() {
-        return Err(ExamplesError::NotTaken(missing.len()));
+    let kept = before.iter().filter(|one| !stale.contains(one)).map(|(_, example)| example);
+    let expected: Vec<Taught> = kept.chain(&new).cloned().collect();
+    let (missing, surplus) = compare(&expected, &read(link)?.taught);
+    if !missing.is_empty() || !surplus.is_empty() {
+        return Err(ExamplesError::NotTaken {
+            missing: missing.len(),
+            surplus: surplus.iter().map(|(number, _)| *number).collect(),
+        });
     }
     Ok(Pushed { taught: new.len(), forgotten: stale.len() })
 }

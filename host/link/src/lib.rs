@@ -54,6 +54,9 @@ use std::time::{Duration, Instant};
 /// Characters that the firmware takes in a line.
 pub const COMMAND_LENGTH: usize = control::say::command::LINE_LENGTH;
 
+/// Further answers to a question that needs two of the same.
+const SURE_TRIES: usize = 3;
+
 /// Time that a read takes in which nothing comes, and that of another one, on average.
 const SILENT_READ: Duration = Duration::from_millis(20);
 const BUSY_READ: Duration = Duration::from_millis(10);
@@ -115,6 +118,22 @@ impl Link {
     pub fn ask(&mut self, command: &str) -> Result<Vec<String>, LinkError> {
         self.send(command)?;
         self.answer(command)
+    }
+
+    /// Asks for what does not change, until two answers in a row are the same: noise may damage a digit, or lose a line.
+    ///
+    /// # Errors
+    /// As [`ask`](Self::ask) has them, and [`LinkError::Unsteady`].
+    pub fn ask_surely(&mut self, question: &str) -> Result<Vec<String>, LinkError> {
+        let mut before = self.ask(question)?;
+        for _ in 0..SURE_TRIES {
+            let answer = self.ask(question)?;
+            if answer == before {
+                return Ok(answer);
+            }
+            before = answer;
+        }
+        Err(LinkError::Unsteady(question.to_owned()))
     }
 
     /// Waits for the answer to a command that was typed.

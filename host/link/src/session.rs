@@ -24,6 +24,7 @@
 //! that of a later command for it, until the end of the wait.
 
 mod happening;
+mod holding;
 mod introduction;
 
 pub use self::happening::{Happening, Turn, Unanswered};
@@ -131,6 +132,7 @@ pub struct Session {
     waiting: VecDeque<Waiting>,
     /// The number of the `hold` to type before anything else.
     to_hold: Option<u64>,
+    held: holding::Typed,
     /// The session's own questions, typed when no command waits. `hold` does not drop them.
     own: BTreeSet<String>,
     numbers: u64,
@@ -191,19 +193,6 @@ impl Session {
             self.waiting.push_back(Waiting { number, line: line.to_owned(), deadline });
             number
         })
-    }
-
-    /// Types `hold` in the next turn and drops all waiting commands. Returns its number. Answers in progress still come,
-    /// before that of `hold`. A `hold` that is already typed and is the last line counts for this one too: the chip's
-    /// receive queue is short.
-    pub fn hold(&mut self) -> u64 {
-        for waiting in std::mem::take(&mut self.waiting) {
-            self.end(waiting.number, waiting.line, Unanswered::Held);
-        }
-        let pending = self.asked.back().filter(|asked| asked.line == HOLD).and_then(|asked| asked.number);
-        let number = pending.or(self.to_hold).unwrap_or_else(|| self.next_number());
-        self.to_hold = pending.is_none().then_some(number);
-        number
     }
 
     /// Whether no command waits for its answer.
@@ -320,9 +309,12 @@ impl Session {
             }
             // The answer may be behind lines that came while the computer was busy.
             State::Ready => {
+                if is_silent && is_over(self.held.at, holding::PATIENCE) && self.waits_for_hold() {
+                    self.hold_again();
+                }
                 if let Some(asked) = self.asked.front().filter(|asked| is_silent && is_over(asked.since, PATIENCE)) {
                     let error = LinkError::Unanswered { command: asked.line.clone(), seconds: PATIENCE.as_secs() };
-                    let late = self.asked.len();
+                    let late = self.asked.len() + self.held.again;
                     self.give_up(error.to_string());
                     self.introduction = Introduction { late, ..Introduction::default() };
                     self.settle();
@@ -344,6 +336,7 @@ impl Session {
         } else if matches!(self.state, State::Asking(_) | State::Ready)
             && let Some(number) = self.to_hold.take()
         {
+            self.held.at = self.waited;
             return self.send(HOLD.to_owned(), Some(number));
         }
         if !self.asked.is_empty() {
@@ -451,14 +444,19 @@ impl Session {
             ConsoleLine::End { error } => error.map(|_| line),
             // At once, not at the answer's end: a log and a map take the machine's position from it.
             ConsoleLine::Status(status) if is_own && self.state == State::Ready => {
+                asked.answer.push(line.clone());
                 return self.report(Happening::Status(status, line));
             }
             // The counts, which earlier versions have fewer of.
             _ if is_own && self.state == State::Ready && line.starts_with("lost=") => {
+                asked.answer.push(line.clone());
                 return self.take_named(named_warning(&line));
             }
             _ => return asked.answer.extend(is_own.then_some(line)),
         };
+        if self.is_of_a_hold(refusal.is_some()) {
+            return;
+        }
         let Some(Asked { line: command, number, answer, .. }) = self.asked.pop_front() else { return };
         if let Some(number) = number {
             if refusal.is_none() {

@@ -138,13 +138,12 @@ pub fn read_shown(link: &mut Link) -> Result<Shown, LinkError> {
     Ok(Shown::by(&read_lines(link)?))
 }
 
-/// The lines that show all settings in use. Asks again if a setting is missing: noise may have damaged its line.
+/// The lines that show all settings in use.
 ///
 /// # Errors
 /// If the console fails.
 pub fn read_lines(link: &mut Link) -> Result<Vec<String>, LinkError> {
-    let lines = link.ask("get")?;
-    if Shown::by(&lines).missing.is_empty() { Ok(lines) } else { link.ask("get") }
+    link.ask_surely("get")
 }
 
 /// The settings of a machine, whose firmware may have another version.
