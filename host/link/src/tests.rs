@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::examples::ExamplesError;
+use crate::settings::Settings;
 use control::ground::class::label;
 use control::ground::examples::EXAMPLES;
 use control::ground::features::Features;
@@ -9,6 +10,8 @@ use control::ground::nearest::Nearest;
 use control::memory::Volatile;
 use rig::{Rig, ScriptedPort};
 use std::assert_matches;
+use std::cell::RefCell;
+use std::rc::Rc;
 
 const VERSION: &[u8] = b"weeder 0.2.0\r\nok\r\n";
 
@@ -239,15 +242,49 @@ fn a_merge_gap_in_ticks_is_pushed_to_old_and_new_machines() {
     }
 }
 
-#[test]
-fn settings_are_asked_for_again_after_a_damaged_line() {
-    let (mut machine, mut asked) = (machine(), 0);
-    let mut link = link(move |line| {
-        asked += usize::from(line == "get");
-        let damaged = if asked == 1 { "lead_out_m~=" } else { "lead_out_ms=" };
-        String::from_utf8(machine(line)).expect("it is text").replace("lead_out_ms=", damaged).into_bytes()
+/// A machine, and a line to it that once loses the byte of this number, of those that it types or of its answers.
+fn damaged(lost: usize, of_answers: bool) -> (Rc<RefCell<impl FnMut(&str) -> Vec<u8>>>, Link) {
+    let machine = Rc::new(RefCell::new(machine()));
+    let (there, mut passed) = (Rc::clone(&machine), 0);
+    let mut lose = move |mut bytes: Vec<u8>| {
+        let at = lost.wrapping_sub(passed);
+        passed += bytes.len();
+        if at < bytes.len() {
+            bytes.remove(at);
+        }
+        bytes
+    };
+    let link = link(move |line| {
+        if of_answers {
+            return lose(there.borrow_mut()(line));
+        }
+        let line = String::from_utf8(lose(line.as_bytes().to_vec())).expect("it is text");
+        there.borrow_mut()(&line)
     });
-    assert!(settings::read_shown(&mut link).expect("the console answers").missing.is_empty());
+    (machine, link)
+}
+
+#[test]
+fn no_lost_byte_makes_settings_or_examples_wrong_that_are_said_to_be_right() {
+    let example = |width| examples::example_of(&Features::describe(278, 250, width), label::PLANT);
+    let (before, wanted) = ([example(20), example(24)], [example(24), example(28)]);
+    for (bytes, step, of_answers) in [(160, 1, false), (25_000, 23, true)] {
+        for lost in (0..bytes).step_by(step) {
+            let (machine, mut link) = damaged(lost, of_answers);
+            for line in before.iter().flat_map(examples::lines) {
+                machine.borrow_mut()(&line);
+            }
+            if let Ok(settings) = settings::read(&mut link) {
+                assert_eq!(settings, Settings::default(), "{lost}");
+            }
+            if examples::push(&mut link, &wanted, true).is_ok() {
+                let said = String::from_utf8(machine.borrow_mut()("examples")).expect("it is text");
+                let taught = said.lines().filter_map(examples::taught).filter(|(from_field, ..)| *from_field);
+                let taught: Vec<_> = taught.map(|(_, _, example)| example).collect();
+                assert!(wanted.iter().all(|one| taught.contains(one)) && taught.len() == 2, "{lost}: {taught:?}");
+            }
+        }
+    }
 }
 
 #[test]
