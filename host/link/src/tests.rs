@@ -242,10 +242,9 @@ fn a_merge_gap_in_ticks_is_pushed_to_old_and_new_machines() {
     }
 }
 
-/// A machine, and a line to it that once loses the byte of this number, of those that it types or of its answers.
-fn damaged(lost: usize, of_answers: bool) -> (Rc<RefCell<impl FnMut(&str) -> Vec<u8>>>, Link) {
-    let machine = Rc::new(RefCell::new(machine()));
-    let (there, mut passed) = (Rc::clone(&machine), 0);
+/// A line to a machine that once loses the byte of this number, of those that it types or of its answers.
+fn damaged(there: Rc<RefCell<impl FnMut(&str) -> Vec<u8> + 'static>>, lost: usize, of_answers: bool) -> Link {
+    let mut passed = 0;
     let mut lose = move |mut bytes: Vec<u8>| {
         let at = lost.wrapping_sub(passed);
         passed += bytes.len();
@@ -254,14 +253,13 @@ fn damaged(lost: usize, of_answers: bool) -> (Rc<RefCell<impl FnMut(&str) -> Vec
         }
         bytes
     };
-    let link = link(move |line| {
+    link(move |line| {
         if of_answers {
             return lose(there.borrow_mut()(line));
         }
         let line = String::from_utf8(lose(line.as_bytes().to_vec())).expect("it is text");
         there.borrow_mut()(&line)
-    });
-    (machine, link)
+    })
 }
 
 #[test]
@@ -270,7 +268,8 @@ fn no_lost_byte_makes_settings_or_examples_wrong_that_are_said_to_be_right() {
     let (before, wanted) = ([example(20), example(24)], [example(24), example(28)]);
     for (bytes, step, of_answers) in [(160, 1, false), (20_000, 13, true)] {
         for lost in (0..bytes).step_by(step) {
-            let (machine, mut link) = damaged(lost, of_answers);
+            let machine = Rc::new(RefCell::new(machine()));
+            let mut link = damaged(Rc::clone(&machine), lost, of_answers);
             for line in before.iter().flat_map(examples::lines) {
                 machine.borrow_mut()(&line);
             }
