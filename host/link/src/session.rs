@@ -132,6 +132,7 @@ pub struct Session {
     waiting: VecDeque<Waiting>,
     /// The number of the `hold` to type before anything else.
     to_hold: Option<u64>,
+    /// The last typed `hold`.
     held: holding::Typed,
     /// The session's own questions, typed when no command waits. `hold` does not drop them.
     own: BTreeSet<String>,

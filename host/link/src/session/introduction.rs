@@ -15,7 +15,7 @@ pub(super) const INTRODUCTION: [&str; 6] = [VERSION, STATUS, SETTINGS, EXAMPLES,
 const LAST: usize = INTRODUCTION.len() - 1;
 
 /// Backspaces, which delete a line of any length. Ended instead, the rest of a line would be a late command.
-const ERASE: u8 = 0x08;
+pub(super) const ERASE: u8 = 0x08;
 
 /// What the first answers have said.
 #[derive(Default)]
