@@ -10,7 +10,8 @@ use std::path::PathBuf;
 #[derive(Args)]
 #[command(after_help = "\
 It shows the first difference between log and replay, and the status is then 1.\n\
-A swing may differ by 12 ticks plus the distance of 25 ms: the log has the speed ten times a second.\n\nExample:\n  weeder replay row.csv --json | jq .difference")]
+A swing may differ by 12 ticks plus the distance of 25 ms: the log has the speed ten times a second.\n\
+A line that was lost on the way to the log shows as a difference too.\n\nExample:\n  weeder replay row.csv --json | jq .difference")]
 pub struct Arguments {
     /// A log of `weeder record` or `weeder monitor --log`; - for standard input.
     #[arg(value_name = "LOG.csv", value_parser = source::file())]

@@ -79,7 +79,10 @@ pub enum LinkError {
 impl LinkError {
     /// Whether it may be the fault of one answer: the same question may succeed.
     pub(crate) fn is_of_an_answer(&self) -> bool {
-        matches!(self, Self::Silent { .. } | Self::NotTheWeeder(_) | Self::Restarted(_) | Self::Refused { .. })
+        matches!(
+            self,
+            Self::Silent { .. } | Self::NotTheWeeder(_) | Self::Restarted(_) | Self::Unsteady(_) | Self::Refused { .. }
+        )
     }
 }
 

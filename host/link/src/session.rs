@@ -10,7 +10,8 @@
 //!
 //! A session types one command at a time, and polls the status. After every start of the machine it asks for version,
 //! settings and examples, and turns the events on. After a command that changes either, it asks for them again.
-//! [`Session::hold`] does not wait, neither for an answer nor for the rest of those questions.
+//! [`Session::hold`] does not wait, neither for an answer nor for the rest of those questions. A value that a command sets
+//! is read back.
 //!
 //! Each command has a number, and each number one end: [`Happening::Answered`] or [`Happening::Unanswered`].
 //!
@@ -23,6 +24,7 @@
 //! The console does not say which command an answer belongs to. If a line of an answer is lost, the session may take
 //! that of a later command for it, until the end of the wait.
 
+mod changes;
 mod happening;
 mod holding;
 mod introduction;
@@ -34,9 +36,8 @@ use self::happening::{UNTIL_HOLD, named_warning};
 use self::introduction::{INTRODUCTION, Introduction};
 use super::moment::Moment;
 use super::settings::Shown;
-use super::{ConsoleLine, EventLine, LineReader, LinkError, Mode, Status, is_command};
+use super::{ConsoleLine, EventLine, LineReader, LinkError, Mode, SURE_TRIES, Status, is_command};
 use control::alarm::Warning;
-use control::say::command::Action;
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
 
@@ -130,6 +131,10 @@ pub struct Session {
     /// Lines without an answer, in the order of the answers: one command, and each `hold` typed after it.
     asked: VecDeque<Asked>,
     waiting: VecDeque<Waiting>,
+    /// The `set` whose value is read back before the next command.
+    accepted: Option<changes::Accepted>,
+    /// The last answer to `get`, unless it is believed.
+    shown_before: Vec<String>,
     /// The number of the `hold` to type before anything else.
     to_hold: Option<u64>,
     /// The last typed `hold`.
@@ -198,7 +203,8 @@ impl Session {
 
     /// Whether no command waits for its answer.
     pub fn is_idle(&self) -> bool {
-        self.waiting.is_empty() && self.to_hold.is_none() && self.asked.iter().all(|asked| asked.number.is_none())
+        let is_answered = self.accepted.is_none() && self.asked.iter().all(|asked| asked.number.is_none());
+        self.waiting.is_empty() && self.to_hold.is_none() && is_answered
     }
 
     /// Whether there is a wire.
@@ -267,6 +273,9 @@ impl Session {
             if let Some(number) = number {
                 self.end(number, line, Unanswered::Unknown(why.clone()));
             }
+        }
+        if let Some(set) = self.accepted.take() {
+            self.end(set.number, set.line, Unanswered::Unknown(why.clone()));
         }
         for Waiting { number, line, .. } in std::mem::take(&mut self.waiting) {
             self.end(number, line, Unanswered::NotTyped(why.clone()));
@@ -355,6 +364,8 @@ impl Session {
                 if self.waited >= self.poll_at + behind {
                     self.poll_at = self.waited + POLL;
                     self.send(STATUS.to_owned(), None);
+                } else if let Some(set) = &self.accepted {
+                    self.send(set.to_type(), None);
                 } else if let Some(Waiting { number, line, .. }) = self.waiting.pop_front() {
                     self.send(line, Some(number));
                 } else if let Some(own) = self.own.pop_first() {
@@ -438,7 +449,9 @@ impl Session {
         // The end of an abandoned answer is ignored.
         let Some(asked) = self.asked.front_mut() else { return };
         let is_own = asked.number.is_none();
-        if !is_own {
+        let is_ok = matches!(said, ConsoleLine::End { error: None });
+        let set = if is_ok && !is_own { changes::set_by(&asked.line) } else { None };
+        if !is_own && set.is_none() {
             self.turn.happened.push(Happening::Answer(line.clone()));
         }
         let refusal = match said {
@@ -459,13 +472,17 @@ impl Session {
             return;
         }
         let Some(Asked { line: command, number, answer, .. }) = self.asked.pop_front() else { return };
-        if let Some(number) = number {
+        if let (Some(number), Some(set)) = (number, set) {
+            self.accept(number, command, set);
+        } else if let Some(number) = number {
             if refusal.is_none() {
                 self.own.extend(self.changed_by(&command).map(str::to_owned));
             }
             self.turn.happened.push(Happening::Answered { number, command, refusal });
         } else if let State::Asking(question) = self.state {
             self.take_first_answer(question, answer, refusal);
+        } else if let Some(set) = self.accepted.take_if(|set| set.to_type() == command) {
+            self.confirm(set, &answer);
         } else if refusal.is_some() || command == SETTINGS && self.is_doubtful(&answer) {
             // Noise has damaged the line: ask again.
             self.own.insert(command);
@@ -475,22 +492,9 @@ impl Session {
             self.turn.happened.push(Happening::Examples(answer));
         }
     }
-
-    /// What to ask again after this command was answered by `ok`; `None` if it changes nothing that the session needs.
-    fn changed_by(&self, command: &str) -> Option<&'static str> {
-        match crate::command(command).ok()?.action {
-            Action::Set | Action::Save | Action::Revert | Action::Defaults | Action::Calibrate => Some(SETTINGS),
-            Action::LabelPlant
-            | Action::LabelWeed
-            | Action::TeachPlant
-            | Action::TeachWeed
-            | Action::Forget
-            | Action::ForgetAll => Some(EXAMPLES),
-            Action::EventsOff => self.keeps_events.then_some(EVENTS),
-            _ => None,
-        }
-    }
 }
 
+#[cfg(test)]
+mod lossy;
 #[cfg(test)]
 mod tests;

@@ -26,7 +26,10 @@ pub enum SettingsError {
     NotKnown(String),
     #[error("{0}. Some settings may be set and not saved: `revert` takes them back")]
     NotSaved(LinkError),
-    #[error("{setting} was set to {wanted} and is {found}: try again, and see to the supply if it stays so")]
+    #[error(
+        "{setting} was set to {wanted} and is {found}; nothing was saved, and `revert` takes back what is set: see to the \
+         cable and the supply, and try again"
+    )]
     NotTaken { setting: String, wanted: u16, found: u16 },
 }
 
@@ -422,8 +425,13 @@ pub fn push(
 /// # Errors
 /// If the console fails, or the firmware has another status than this program.
 pub fn status(link: &mut Link) -> Result<Status, LinkError> {
-    let lines = link.ask("status")?;
-    lines.iter().find_map(|line| Status::parse(line)).ok_or_else(|| LinkError::NotTheWeeder(lines.join(" ")))
+    let mut lines = link.ask("status")?;
+    let found = |lines: &[String]| lines.iter().find_map(|line| Status::parse(line));
+    if found(&lines).is_none() {
+        // Noise has damaged it, or it is another firmware.
+        lines = link.ask("status")?;
+    }
+    found(&lines).ok_or_else(|| LinkError::NotTheWeeder(lines.join(" ")))
 }
 
 #[cfg(test)]

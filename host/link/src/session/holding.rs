@@ -76,12 +76,7 @@ impl Session {
 mod tests {
     use super::*;
     use crate::moment::Moment;
-    use crate::session::{Happening, Turn, VERSION};
-    use control::ground::examples::EXAMPLES;
-    use control::ground::nearest::Nearest;
-    use control::memory::Volatile;
-    use control::operate::state::State;
-    use rig::Rig;
+    use crate::session::{Happening, VERSION};
 
     /// What a session with a machine has typed and said in 2 s. `hold` is typed after 1 s; the machine's answers to `hold` are
     /// these, then "ok". An empty one is lost.
@@ -139,50 +134,6 @@ mod tests {
             // No answer is taken for that of another question.
             let statuses = happened.iter().rev().take(20).filter(|one| matches!(one, Happening::Status(..))).count();
             assert!(statuses > 5, "{answers:?}: {statuses}");
-        }
-    }
-    /// The firmware's decisions at work, and a session whose line loses this byte behind a `start now` and the `hold` after
-    /// it: how the session's `hold` has ended after 1 s. The machine has to be in HOLD after half of that.
-    fn held_without(lost: usize, of_answers: bool) -> Vec<Happening> {
-        let mut rig = Rig::new(Nearest::new(&EXAMPLES[..], Volatile::new()));
-        assert_eq!(rig.ask("start now"), ["ok"]);
-        let (mut session, mut now, mut received) = (Session::default(), Moment::default(), Vec::new());
-        let (mut passed, mut ends) = (0, Vec::new());
-        session.open(false);
-        for turn in 0..100 {
-            match turn {
-                49 => assert!(session.is_connected() && session.command("start now", Moment::NEVER).is_some()),
-                50 => drop(session.hold()),
-                75 => assert_eq!(rig.state(), State::Hold, "{lost} {of_answers}"),
-                _ => {}
-            }
-            now = now.after(Duration::from_millis(20));
-            let Turn { happened, mut to_send, .. } = session.turn(now, &received);
-            let is_end = |one: &Happening| matches!(one, Happening::Answered { command, .. } if command == HOLD);
-            ends.extend(happened.into_iter().filter(is_end));
-            let mut lose = |bytes: &mut Vec<u8>| {
-                let at = lost.wrapping_sub(passed);
-                if turn >= 49 {
-                    passed += bytes.len();
-                    (at < bytes.len()).then(|| bytes.remove(at));
-                }
-            };
-            if !of_answers {
-                lose(&mut to_send);
-            }
-            received = rig.type_in(to_send).iter().flat_map(|line| format!("{line}\r\n").into_bytes()).collect();
-            if of_answers {
-                lose(&mut received);
-            }
-        }
-        ends
-    }
-
-    #[test]
-    fn a_hold_comes_through_whichever_byte_is_lost() {
-        for (lost, of_answers) in (0..200).flat_map(|lost| [(lost, false), (lost, true)]) {
-            let ends = held_without(lost, of_answers);
-            assert!(matches!(ends[..], [Happening::Answered { refusal: None, .. }]), "{lost} {of_answers}: {ends:?}");
         }
     }
 }

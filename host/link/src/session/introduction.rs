@@ -9,6 +9,9 @@ use crate::{COMMAND_LENGTH, ConsoleLine, EventLine, LinkError, Status, lines};
 /// Further tries to ask for everything, if an answer is missing or belongs to another question.
 const RETRIES: usize = 2;
 
+/// Most answers to `get` in a row of which no two are the same.
+const UNSTEADY: usize = 10;
+
 /// The first questions. The first status is asked only if earlier tries may still be answered: it is the first answer
 /// that cannot belong to those.
 pub(super) const INTRODUCTION: [&str; 6] = [VERSION, STATUS, SETTINGS, EXAMPLES, EVENTS, STATUS];
@@ -28,8 +31,8 @@ pub(super) struct Introduction {
     pub(super) has_held: bool,
     /// The last answer that was taken for one of those.
     pub(super) wrong: Option<LinkError>,
-    /// Whether the settings are asked for once more.
-    pub(super) asks_again: bool,
+    /// How often the settings were asked for again, because two answers differ.
+    pub(super) asked_again: usize,
     pub(super) shown: Vec<String>,
     pub(super) examples: Vec<String>,
     /// Bytes received since the last question.
@@ -91,7 +94,13 @@ impl Session {
         match (question, version) {
             (0, Some(version)) => self.version = version,
             (1, _) => self.introduction.late = 0,
-            (2, _) if self.is_doubtful(&answer) => return,
+            (2, _) if self.is_doubtful(&answer) => {
+                self.introduction.asked_again += 1;
+                if self.introduction.asked_again > UNSTEADY {
+                    self.ask_again(LinkError::Unsteady(SETTINGS.to_owned()));
+                }
+                return;
+            }
             (2, _) => self.introduction.shown = answer,
             (3, _) => self.introduction.examples = answer,
             (LAST, _) => return self.connect(answer),
@@ -99,14 +108,6 @@ impl Session {
         }
         let next = if question == 0 && self.introduction.late == 0 { 2 } else { question + 1 };
         self.state = if next == 2 && self.is_bare { State::Ready } else { State::Asking(next) };
-    }
-
-    /// Whether this answer to `get` may have lost lines: it lacks settings, and the answer before it did not. Another
-    /// version lacks them twice.
-    pub(super) fn is_doubtful(&mut self, answer: &[String]) -> bool {
-        let asked_again = self.introduction.asks_again;
-        self.introduction.asks_again = !asked_again && !Shown::by(answer).missing.is_empty();
-        self.introduction.asks_again
     }
 
     /// All first questions are answered, with this status as the last. A newer firmware's may be unknown here.
@@ -211,11 +212,11 @@ mod tests {
     }
 
     #[test]
-    fn settings_with_a_lost_line_are_asked_for_once_more() {
+    fn settings_count_when_two_answers_agree() {
         let line = |setting: Setting| format!("{}={} from 0 to 9\r\n", setting.text(), setting.default());
         let all: Vec<String> = Setting::all().map(line).collect();
         // Another version lacks one in every answer.
-        for (damaged, found) in [([true, false], all.len()), ([true, true], all.len() - 1)] {
+        for (damaged, found) in [([true, false, false], all.len()), ([true; 3], all.len() - 1)] {
             let (mut session, mut now, mut received) = (Session::default(), Moment::default(), String::new());
             let (mut answers, mut shown) = (damaged.iter().cycle(), Vec::new());
             session.open(false);
@@ -235,5 +236,20 @@ mod tests {
             }
             assert_eq!(shown, [found; 2]);
         }
+    }
+
+    #[test]
+    fn a_machine_that_never_shows_the_same_settings_twice_is_given_up() {
+        let (mut session, mut now, mut k) = (Session::default(), Moment::default(), 0);
+        let mut received = String::new();
+        session.open(false);
+        while session.is_open() {
+            now = now.after(Duration::from_millis(20));
+            assert!(now.ticking < Duration::from_secs(60));
+            drop(session.turn(now, received.as_bytes()));
+            k = k % 15 + 1;
+            received = answer(&session, &format!("k={k} from 1 to 15, default 3\r\n"), "");
+        }
+        assert!(matches!(session.take_failure(), Some(LinkError::Unsteady(_))));
     }
 }

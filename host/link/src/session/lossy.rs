@@ -1,0 +1,135 @@
+//! A session with the firmware's decisions over a line that loses a byte.
+
+use super::*;
+use crate::settings::Setting;
+use control::ground::examples::EXAMPLES;
+use control::ground::nearest::Nearest;
+use control::memory::Volatile;
+use control::operate::state::State as Operating;
+use rig::{ByExamples, Rig};
+
+/// Time between two turns.
+const TURN: Duration = Duration::from_millis(20);
+
+/// Turns until the session is connected.
+const CONNECTED: usize = 50;
+
+/// A machine at work and a session with it, after some turns. The session does something behind its connection, and the
+/// line loses this byte of what follows. Returns what has happened since.
+fn talk(
+    turns: usize,
+    lost: usize,
+    of_answers: bool,
+    mut act: impl FnMut(&mut Session, usize, &Rig<ByExamples>),
+) -> (Rig<ByExamples>, Vec<Happening>) {
+    let mut rig = Rig::new(Nearest::new(&EXAMPLES[..], Volatile::new()));
+    assert_eq!(rig.ask("start now"), ["ok"]);
+    let (mut session, mut now, mut received) = (Session::default(), Moment::default(), Vec::new());
+    let (mut passed, mut happened) = (0, Vec::new());
+    session.open(false);
+    for turn in 0..CONNECTED + turns {
+        let is_behind = turn >= CONNECTED;
+        if is_behind {
+            assert!(turn > CONNECTED || session.is_connected());
+            act(&mut session, turn - CONNECTED, &rig);
+        }
+        now = now.after(TURN);
+        let mut turn = session.turn(now, &received);
+        let mut lose = |bytes: &mut Vec<u8>| {
+            let at = lost.wrapping_sub(passed);
+            if is_behind {
+                passed += bytes.len();
+                (at < bytes.len()).then(|| bytes.remove(at));
+            }
+        };
+        if !of_answers {
+            lose(&mut turn.to_send);
+        }
+        received = rig.type_in(turn.to_send).iter().flat_map(|line| format!("{line}\r\n").into_bytes()).collect();
+        if of_answers {
+            lose(&mut received);
+        }
+        happened.extend(turn.happened.into_iter().filter(|_| is_behind));
+    }
+    (rig, happened)
+}
+
+/// The ends of commands that begin so.
+fn ends<'a>(happened: &'a [Happening], begins: &str) -> Vec<&'a Happening> {
+    let is_end = |one: &&Happening| match one {
+        Happening::Answered { command, .. } | Happening::Unanswered { command, .. } => command.starts_with(begins),
+        _ => false,
+    };
+    happened.iter().filter(is_end).collect()
+}
+
+/// The first bytes after a moment, typed or answered.
+fn bytes() -> impl Iterator<Item = (usize, bool)> {
+    (0..200).flat_map(|lost| [(lost, false), (lost, true)])
+}
+
+#[test]
+fn a_hold_comes_through_whichever_byte_is_lost() {
+    for (lost, of_answers) in bytes() {
+        let (_, happened) = talk(50, lost, of_answers, |session, turn, rig| match turn {
+            0 => assert!(session.command("start now", Moment::NEVER).is_some()),
+            1 => drop(session.hold()),
+            26 => assert_eq!(rig.state(), Operating::Hold, "{lost} {of_answers}"),
+            _ => {}
+        });
+        let ends = ends(&happened, HOLD);
+        assert!(matches!(ends[..], [Happening::Answered { refusal: None, .. }]), "{lost} {of_answers}: {ends:?}");
+    }
+}
+
+#[test]
+fn a_set_that_is_answered_ok_has_set_this_whichever_byte_is_lost() {
+    let mut is_ok = 0;
+    // The settings that are read behind it are longer.
+    for (lost, of_answers) in bytes().chain((200..3000).step_by(13).map(|lost| (lost, true))) {
+        let (mut rig, happened) = talk(250, lost, of_answers, |session, turn, _| {
+            if turn == 1 {
+                session.command("set k 15", Moment::NEVER).unwrap();
+            }
+        });
+        let k = rig.settings().get(Setting::K);
+        match ends(&happened, "set")[..] {
+            [Happening::Answered { refusal: None, .. }] => {
+                assert_eq!(k, 15, "{lost} {of_answers}");
+                is_ok += 1;
+            }
+            [Happening::Answered { .. } | Happening::Unanswered { .. }] => {}
+            ref ends => panic!("{lost} {of_answers}: {ends:?}"),
+        }
+        // The last settings that the session tells are the machine's.
+        let told = happened.iter().rev().find_map(|one| match one {
+            Happening::Settings(settings, _) | Happening::Connected { settings, .. } => Some(settings.get(Setting::K)),
+            _ => None,
+        });
+        assert_eq!(told.unwrap_or(rig.settings().get(Setting::K)), k, "{lost} {of_answers}");
+    }
+    assert!(is_ok > 350, "{is_ok}");
+}
+
+#[test]
+fn a_set_that_noise_changes_each_time_is_refused() {
+    let (mut session, mut now, mut received) = (Session::default(), Moment::default(), String::new());
+    let (mut typed, mut happened) = (0, Vec::new());
+    let mut rig = Rig::new(Nearest::new(&EXAMPLES[..], Volatile::new()));
+    session.open(false);
+    for turn in 0..200 {
+        if turn == CONNECTED {
+            session.command("set k 15", Moment::NEVER).unwrap();
+        }
+        now = now.after(TURN);
+        let turn = session.turn(now, received.as_bytes());
+        happened.extend(turn.happened);
+        let sent = String::from_utf8(turn.to_send).unwrap();
+        typed += sent.matches("set k 15").count();
+        received = rig.type_in(sent.replace("15", "1").into_bytes()).join("\r\n") + "\r\n";
+    }
+    assert!(matches!(ends(&happened, "set")[..], [Happening::Answered { refusal: Some(_), .. }]), "{happened:?}");
+    let answers: Vec<_> = happened.iter().filter(|one| matches!(one, Happening::Answer(_))).collect();
+    assert!(matches!(answers[..], [Happening::Answer(said)] if said.starts_with("error: noise")), "{answers:?}");
+    assert_eq!(typed, 1 + SURE_TRIES);
+}
