@@ -87,7 +87,7 @@ fn a_set_that_is_answered_ok_has_set_this_whichever_byte_is_lost() {
     let mut is_ok = 0;
     // The settings that are read behind it are longer.
     for (lost, of_answers) in bytes().chain((200..3000).step_by(13).map(|lost| (lost, true))) {
-        let (mut rig, happened) = talk(250, lost, of_answers, |session, turn, _| {
+        let (rig, happened) = talk(250, lost, of_answers, |session, turn, _| {
             if turn == 1 {
                 session.command("set k 15", Moment::NEVER).unwrap();
             }
