@@ -193,7 +193,8 @@ function placedLog(eastM: number): string {
     lines.push("0,setting,ticks_per_m=2000", "0,setting,beam_to_tool_mm=400", "0,setting,margin_mm=50");
     for (let ms = 0; ms <= 60_000; ms += 100) {
         const metres = ms / 2000;
-        const pos = 2000 * metres;
+        // 2000 ticks a metre, at half a metre a second.
+        const pos = ms;
         if (ms % 1000 === 0) {
             const minutes = (degrees: number) => (60 * degrees).toFixed(7).padStart(10, "0");
             const [north, east] = [minutes(metres / 111_000), minutes(eastM / 111_000)];
@@ -257,7 +258,7 @@ test("the page of weeder serve reads a log and draws its map too", async (test) 
     const port = join(folder(test), "uno");
     await plugIn(test, port);
     const served = await serve(test, [port]);
-    writeFileSync("build/files/served.csv", placedLog(0));
+    writeFileSync("build/files/served.csv", placedLog(0).replace("swing tool=out pos=", "swing tool=o"));
     const opened = await openAt(browser, served.here);
     await opened.page.locator('a[href="#record"]').click();
     await inView(opened.page, "log-file").setInputFiles("build/files/served.csv");
@@ -265,6 +266,9 @@ test("the page of weeder serve reads a log and draws its map too", async (test) 
         .filter({ hasText: /60 detections/ })
         .waitFor();
     await inView(opened.page, "log-map").click();
+    await inView(opened.page, "log-mapped")
+        .filter({ hasText: /^The map has \d+ positions\. Lines left out, .*: 1\.$/ })
+        .waitFor();
     const drawn = inView(opened.page, "log-map-drawn");
     await drawn.waitFor();
     await drawn.evaluate((image) => (image as HTMLImageElement).decode());

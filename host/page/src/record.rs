@@ -299,12 +299,14 @@ pub fn job() -> Value {
     })
 }
 
-/// The map of all added logs as SVG, and how many of their objects are on it. No SVG if none has a position.
+/// The map of all added logs as SVG, how many of their objects are on it, and how many lines are left out. No SVG if none
+/// has a position.
 pub fn map(words: &Words) -> Value {
     let jobs = JOBS.take();
     let drawn = draw(&jobs.iter().collect::<Vec<_>>(), words);
     let placed = jobs.iter().flat_map(Job::events).filter(|event| event.found.is_ok()).count();
-    json!({ "svg": drawn.map(|drawn| drawn.to_string()), "placed": placed })
+    let left_out: u64 = jobs.iter().map(|job| job.left_out + job.without_wheel).sum();
+    json!({ "svg": drawn.map(|drawn| drawn.to_string()), "placed": placed, "leftOut": left_out })
 }
 
 #[cfg(test)]

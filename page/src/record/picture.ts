@@ -25,6 +25,13 @@ export interface Trouble {
     readonly isWarning: boolean;
 }
 
+/** A map as SVG, if anything has a place; how many objects have one, and how many lines of the logs are left out. */
+export interface Mapped {
+    readonly svg: string | null;
+    readonly placed: number;
+    readonly leftOut: number;
+}
+
 /** How much of a log and this firmware agrees, and the first difference. */
 export interface Replayed {
     readonly objects: number;

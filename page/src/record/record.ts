@@ -7,6 +7,7 @@ import { draw, make, type Parts } from "../dom.ts";
 import { fault, sentence } from "../panel/machine.ts";
 import { onLanguage, quantity, reason, say } from "../words/words.ts";
 import {
+    type Mapped,
     type Picture,
     type Problem,
     picture,
@@ -239,8 +240,9 @@ export class RecordView {
             north: say("north"),
         };
         await this.#eachOf(files.slice(0, 1), "log-mapped", async (_, work) => {
-            const { svg, placed } = await read<{ svg: string | null; placed: number }>(files, { map: words }, work);
-            this.parts.say("log-mapped", () => (svg ? say("mapped", { count: placed }) : say("noMap")));
+            const { svg, placed, leftOut } = await read<Mapped>(files, { map: words }, work);
+            const left = () => (leftOut > 0 ? ` ${say("mapLeftOut", { count: leftOut })}` : "");
+            this.parts.say("log-mapped", () => (svg ? say("mapped", { count: placed }) : say("noMap")) + left());
             this.#showMap(svg);
         });
     }

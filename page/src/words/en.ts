@@ -328,6 +328,7 @@ export const words = {
     mapDrawing: "The map of the work, from above",
     mapped: "The map has {count} position.|The map has {count} positions.",
     noMap: "Nothing in these logs has a position.",
+    mapLeftOut: "Lines left out, as damaged, of another firmware, or without a known wheel: {count}.",
     mapWeeded: "weeded",
     mapLeft: "not weeded",
     mapKept: "unknown, kept",
