@@ -44,7 +44,11 @@ class Connected {
             close: async () => {},
         };
         this.session = new Session(wire, this.nowMs, false, () => this.nowMs + this.calendarMs);
-        uno.onByte = (byte) => this.session.receive(String.fromCharCode(byte));
+        const hears = uno.onByte;
+        uno.onByte = (byte) => {
+            hears(byte);
+            this.session.receive(String.fromCharCode(byte));
+        };
         this.session.onHappening = (happening) => this.happened.push(happening);
     }
 
@@ -76,6 +80,13 @@ class Connected {
 
     hasAfterReset(is: Happening["is"]): boolean {
         return this.happened.slice(this.#resetAt).some((happening) => happening.is === is);
+    }
+
+    /** Whether it works, as it says itself to an operator beside the session. */
+    get works(): boolean {
+        // The session's last answer comes first.
+        this.#operator.run(1000);
+        return this.#operator.ask("status").some((line) => line.startsWith("state=work"));
     }
 
     /** The machine's last reported state. */
@@ -265,7 +276,7 @@ async function pressInAnyOrder(seed: number): Promise<string[]> {
     machine.stalledUntil = 0;
     for (let turn = 0; turn < 2 * TURNS && (holds > 0 || ends.includes("pending")); turn++) await machine.turn();
     for (let turn = 0; turn < TURNS / 3; turn++) await machine.turn();
-    if (lastIsHold && !machine.isOver) assert.notEqual(machine.mode, "work", `seed ${seed}: behind the last HOLD`);
+    if (lastIsHold && !machine.isOver) assert(!machine.works, `seed ${seed}: behind the last HOLD`);
     for (const [number, end] of ends.entries()) {
         const line = `start now${" ".repeat(number)}`;
         const isSent = machine.happened.some((happening) => happening.is === "command" && happening.line === line);
@@ -277,7 +288,7 @@ async function pressInAnyOrder(seed: number): Promise<string[]> {
 }
 
 test("in any order nothing starts that was told as not sent, and a HOLD that is pressed last holds", async (test) => {
-    const first = Number(process.env.WEEDER_SEED ?? 1);
+    const first = Number(process.env.WEEDER_SEED ?? 13);
     test.diagnostic(`WEEDER_SEED=${first}`);
     const ends: string[] = [];
     for (let seed = first; seed < first + RUNS; seed++) ends.push(...(await pressInAnyOrder(seed)));

@@ -133,7 +133,7 @@ pub struct Session {
     waiting: VecDeque<Waiting>,
     /// The `set` whose value is read back before the next command.
     accepted: Option<changes::Accepted>,
-    /// The last answer about settings or examples, unless it is believed.
+    /// The last answer to `get`, unless it is believed.
     doubted: Option<Vec<String>>,
     /// The number of the `hold` to type before anything else.
     to_hold: Option<u64>,
@@ -483,7 +483,7 @@ impl Session {
             self.take_first_answer(question, answer, refusal);
         } else if let Some(set) = self.accepted.take_if(|set| set.to_type() == command) {
             self.confirm(set, &answer);
-        } else if refusal.is_some() || [SETTINGS, EXAMPLES].contains(&&*command) && self.is_doubtful(&answer) {
+        } else if refusal.is_some() || command == SETTINGS && self.is_doubtful(&answer) {
             // Noise may have damaged a line: ask again.
             self.own.insert(command);
         } else if command == SETTINGS {

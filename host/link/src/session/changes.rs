@@ -2,13 +2,13 @@
 //!
 //! # How it works
 //!
-//! The session believes settings and examples that the machine has shown twice in a row. Behind a `set` it asks for that
-//! setting, before it types the next command. If the value is another one, it types `set` again. The answer counts after
-//! that.
+//! The session believes settings that the machine has shown twice in a row. Behind a `set` it asks for that setting, before
+//! it types the next command. If the value is another one, it types `set` again. The answer counts after that.
 //!
 //! # Limits
 //!
-//! The machine obeys another command that noise has made of a valid one, as `forget 1` of `forget 12`.
+//! The machine obeys another command that noise has made of a valid one, as `forget 1` of `forget 12`. Examples are read
+//! once: their answer is so long that a noisy line seldom gives the same twice, and a session that waits for it cannot hold.
 
 use super::{EVENTS, EXAMPLES, Happening, SETTINGS, SURE_TRIES, Session};
 use crate::settings::{Setting, name, shown};
@@ -65,7 +65,7 @@ impl Session {
         self.turn.happened.push(Happening::Answered { number, command, refusal });
     }
 
-    /// Whether this answer about settings or examples differs from the one before it.
+    /// Whether this answer to `get` differs from the one before it.
     pub(super) fn is_doubtful(&mut self, answer: &[String]) -> bool {
         let is_new = self.doubted.as_deref() != Some(answer);
         self.doubted = is_new.then(|| answer.to_vec());

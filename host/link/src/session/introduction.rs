@@ -9,7 +9,7 @@ use crate::{COMMAND_LENGTH, ConsoleLine, EventLine, LinkError, Status, lines};
 /// Further tries to ask for everything, if an answer is missing or belongs to another question.
 const RETRIES: usize = 2;
 
-/// Most such questions of a try.
+/// Most further questions for the settings in a try.
 const UNSTEADY: usize = 10;
 
 /// The first questions. The first status is asked only if earlier tries may still be answered: it is the first answer
@@ -31,7 +31,7 @@ pub(super) struct Introduction {
     pub(super) has_held: bool,
     /// The last answer that was taken for one of those.
     pub(super) wrong: Option<LinkError>,
-    /// How often a question was asked again, because two answers differ.
+    /// How often the settings were asked for again, because two answers differ.
     pub(super) asked_again: usize,
     pub(super) shown: Vec<String>,
     pub(super) examples: Vec<String>,
@@ -94,10 +94,10 @@ impl Session {
         match (question, version) {
             (0, Some(version)) => self.version = version,
             (1, _) => self.introduction.late = 0,
-            (2 | 3, _) if self.is_doubtful(&answer) => {
+            (2, _) if self.is_doubtful(&answer) => {
                 self.introduction.asked_again += 1;
                 if self.introduction.asked_again > UNSTEADY {
-                    self.ask_again(LinkError::Unsteady(INTRODUCTION[question].to_owned()));
+                    self.ask_again(LinkError::Unsteady(SETTINGS.to_owned()));
                 }
                 return;
             }
