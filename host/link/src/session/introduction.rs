@@ -9,6 +9,10 @@ use crate::{COMMAND_LENGTH, ConsoleLine, EventLine, LinkError, Status, lines};
 /// Further tries to ask for everything, if an answer is missing or belongs to another question.
 const RETRIES: usize = 2;
 
+/// The same, of a machine that has answered before. To open its port again resets it, and without a session it cannot be
+/// held.
+const RETRIES_OF_A_KNOWN: usize = 8;
+
 /// Most further questions for the settings in a try.
 const UNSTEADY: usize = 10;
 
@@ -51,7 +55,8 @@ impl Session {
 
     /// Asks for everything again, if that may help. A `hold` without an answer is typed again.
     pub(super) fn ask_again(&mut self, error: LinkError) {
-        if !error.is_of_an_answer() || self.introduction.tries == RETRIES {
+        let retries = if self.version.is_empty() { RETRIES } else { RETRIES_OF_A_KNOWN };
+        if !error.is_of_an_answer() || self.introduction.tries == retries {
             return self.lose(error);
         }
         let Introduction { tries, late, early, .. } = std::mem::take(&mut self.introduction);
@@ -209,6 +214,28 @@ mod tests {
         // A log and a script get the one that stood at the connection as an event.
         let said = cases.iter().map(|(said, ..)| said.trim()).filter(|said| !said.is_empty());
         assert_eq!(events, ["warning name=settings_older"].into_iter().chain(said).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn a_machine_that_was_there_is_asked_longer_than_a_device_that_never_was() {
+        // The time of silence from which on the wire is given up, in seconds.
+        for (was_there, seconds) in [(true, 15..25), (false, 5..8)] {
+            let (mut session, mut now, mut received) = (Session::default(), Moment::default(), String::new());
+            session.open(false);
+            let mut silent_since = Duration::ZERO;
+            while session.is_open() {
+                now = now.after(Duration::from_millis(20));
+                drop(session.turn(now, received.as_bytes()));
+                received.clear();
+                if was_there && now.ticking < Duration::from_secs(2) {
+                    received = answer(&session, "k=3 from 1 to 15, default 3\r\n", "");
+                    silent_since = now.ticking;
+                }
+            }
+            let silent = now.ticking - silent_since;
+            assert!(seconds.contains(&silent.as_secs()), "{was_there}: {silent:?}");
+            assert!(matches!(session.take_failure(), Some(LinkError::Silent { .. })));
+        }
     }
 
     #[test]
