@@ -166,7 +166,7 @@ impl Session {
 
     /// A wire was opened; `resets` says whether that has reset the Uno.
     pub fn open(&mut self, resets: bool) {
-        (self.lines, self.introduction) = Default::default();
+        (self.lines, self.introduction, self.version) = Default::default();
         if resets {
             self.state = State::Starting { since: self.waited };
         } else {
@@ -217,7 +217,7 @@ impl Session {
         self.state == State::Ready
     }
 
-    /// The firmware's version; empty before the first connection.
+    /// The firmware's version; empty before it has answered over this wire.
     pub fn version(&self) -> &str {
         &self.version
     }
@@ -248,6 +248,7 @@ impl Session {
         for Waiting { number, line, .. } in late {
             self.end(number, line, Unanswered::Late);
         }
+        self.accepted.iter_mut().for_each(|set| set.expire(now));
         self.type_next();
         std::mem::take(&mut self.turn)
     }
@@ -482,7 +483,7 @@ impl Session {
         } else if let State::Asking(question) = self.state {
             self.take_first_answer(question, answer, refusal);
         } else if let Some(set) = self.accepted.take_if(|set| set.to_type() == command) {
-            self.confirm(set, &answer);
+            self.confirm(set, &answer, refusal);
         } else if refusal.is_some() || command == SETTINGS && self.is_doubtful(&answer) {
             // Noise may have damaged a line: ask again.
             self.own.insert(command);
@@ -494,7 +495,5 @@ impl Session {
     }
 }
 
-#[cfg(test)]
-mod lossy;
 #[cfg(test)]
 mod tests;

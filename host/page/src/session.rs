@@ -100,7 +100,8 @@ fn answer(session: &mut Session, turn: Turn) -> Value {
 /// Why no weeder answers, in the form of `Failure` in `page/src/link/session.ts`.
 fn failure(error: &LinkError) -> Value {
     let (is, about) = match error {
-        LinkError::Noise | LinkError::Unsteady(_) => ("noText", String::new()),
+        LinkError::Noise => ("noText", String::new()),
+        LinkError::Unsteady(_) => ("unsteady", String::new()),
         LinkError::Silent { received, .. } if received.is_empty() => ("nothingAnswers", String::new()),
         LinkError::Restarted(command) => ("resetWhileAsked", command.clone()),
         LinkError::Silent { received: answer, .. }

@@ -131,7 +131,10 @@ interface Turn {
     )[];
     readonly send: string;
     /** Why no weeder answers, and what the reason is about. */
-    readonly failure: { is: "noText" | "nothingAnswers" | "otherDevice" | "resetWhileAsked"; about: string } | null;
+    readonly failure: {
+        is: "noText" | "unsteady" | "nothingAnswers" | "otherDevice" | "resetWhileAsked";
+        about: string;
+    } | null;
 }
 
 export class Session implements Link {

@@ -375,6 +375,8 @@ export const heard = {
     resetWhileAsked: "the Uno was reset while it was asked `{command}`: see to its supply, then try again",
     nothingAnswers: "nothing answers at this port: choose another, or press the Uno's reset; flash a new board first",
     noText: "this port sends no text: choose another; on an Uno check that D0 and D1 are free, and flash it again",
+    unsteady:
+        "no two answers are the same: the line is noisy, so take a shorter cable, away from motors, and try again",
     otherDevice: 'it is not the weeder\'s firmware that answers, but "{text}": choose another port, or flash this one',
     servedSilent:
         "the computer that has the machine's port does not answer: see that this device is in its network, and that weeder serve runs there",

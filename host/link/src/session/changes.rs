@@ -8,9 +8,11 @@
 //! # Limits
 //!
 //! The machine obeys another command that noise has made of a valid one, as `forget 1` of `forget 12`. Examples are read
-//! once: their answer is so long that a noisy line seldom gives the same twice, and a session that waits for it cannot hold.
+//! once: their answer is so long that a noisy line seldom gives the same twice. A `hold` that is typed meanwhile is answered
+//! before the `set`.
 
-use super::{EVENTS, EXAMPLES, Happening, SETTINGS, SURE_TRIES, Session};
+use super::{EVENTS, EXAMPLES, Happening, PATIENCE, SETTINGS, SURE_TRIES, Session};
+use crate::moment::Moment;
 use crate::settings::{Setting, name, shown};
 use control::say::command::{Action, Command};
 
@@ -22,16 +24,27 @@ pub(super) struct Accepted {
     pub(super) number: u64,
     pub(super) line: String,
     set: (Setting, u16),
+    /// Until when it may be typed again: later, others may have set another value.
+    until: Moment,
     /// How often it was typed again.
     again: usize,
     /// Whether it has to be typed again.
     is_wrong: bool,
+    /// The last refusal of it.
+    refusal: Option<String>,
 }
 
 impl Accepted {
     /// What to type next: the question for the value, or the command again.
     pub(super) fn to_type(&self) -> String {
         if self.is_wrong { self.line.clone() } else { format!("{SETTINGS} {}", name(self.set.0)) }
+    }
+
+    /// A late one is not typed again.
+    pub(super) fn expire(&mut self, now: Moment) {
+        if now.is_after(self.until) {
+            (self.is_wrong, self.again) = (false, SURE_TRIES);
+        }
     }
 }
 
@@ -46,23 +59,26 @@ pub(super) fn set_by(line: &str) -> Option<(Setting, u16)> {
 impl Session {
     /// Takes a `set` that the machine has accepted.
     pub(super) fn accept(&mut self, number: u64, line: String, set: (Setting, u16)) {
-        self.accepted = Some(Accepted { number, line, set, again: 0, is_wrong: false });
+        let until = self.turned.unwrap_or_default().after(PATIENCE);
+        self.accepted = Some(Accepted { number, line, set, until, again: 0, is_wrong: false, refusal: None });
     }
 
     /// Takes the answer to what an accepted `set` has had typed.
-    pub(super) fn confirm(&mut self, mut accepted: Accepted, answer: &[String]) {
+    pub(super) fn confirm(&mut self, mut accepted: Accepted, answer: &[String], refusal: Option<String>) {
         let is_set = answer.iter().any(|line| shown(line) == Some(accepted.set));
-        if accepted.is_wrong || !is_set && accepted.again < SURE_TRIES {
-            accepted.again += usize::from(!accepted.is_wrong);
-            accepted.is_wrong ^= true;
+        if accepted.is_wrong {
+            (accepted.is_wrong, accepted.refusal) = (false, refusal);
             self.accepted = Some(accepted);
-            return;
+        } else if !is_set && accepted.again < SURE_TRIES {
+            (accepted.is_wrong, accepted.again) = (true, accepted.again + 1);
+            self.accepted = Some(accepted);
+        } else {
+            self.own.insert(SETTINGS.to_owned());
+            let Accepted { number, line: command, refusal, .. } = accepted;
+            let refusal = (!is_set).then(|| refusal.unwrap_or_else(|| CHANGED.to_owned()));
+            self.turn.happened.push(Happening::Answer(refusal.clone().unwrap_or_else(|| "ok".to_owned())));
+            self.turn.happened.push(Happening::Answered { number, command, refusal });
         }
-        self.own.insert(SETTINGS.to_owned());
-        let said = if is_set { "ok" } else { CHANGED };
-        self.turn.happened.push(Happening::Answer(said.to_owned()));
-        let (Accepted { number, line: command, .. }, refusal) = (accepted, (!is_set).then(|| said.to_owned()));
-        self.turn.happened.push(Happening::Answered { number, command, refusal });
     }
 
     /// Whether this answer to `get` differs from the one before it.

@@ -51,7 +51,7 @@ pub enum Happening {
         number: u64,
         /// The command.
         command: String,
-        /// The line that begins with `error:`, if the firmware refused.
+        /// The line that begins with `error:`, if the firmware refused, or if noise on the line has changed the value.
         refusal: Option<String>,
     },
     /// A command will not be answered.

@@ -9,9 +9,9 @@ use crate::{COMMAND_LENGTH, ConsoleLine, EventLine, LinkError, Status, lines};
 /// Further tries to ask for everything, if an answer is missing or belongs to another question.
 const RETRIES: usize = 2;
 
-/// The same, of a machine that has answered before. To open its port again resets it, and without a session it cannot be
-/// held.
-const RETRIES_OF_A_KNOWN: usize = 8;
+/// The same, where a weeder has answered over this wire. To open its port again resets it, and without a session it cannot
+/// be held.
+const RETRIES_OF_A_WEEDER: usize = 8;
 
 /// Most further questions for the settings in a try.
 const UNSTEADY: usize = 10;
@@ -55,7 +55,7 @@ impl Session {
 
     /// Asks for everything again, if that may help. A `hold` without an answer is typed again.
     pub(super) fn ask_again(&mut self, error: LinkError) {
-        let retries = if self.version.is_empty() { RETRIES } else { RETRIES_OF_A_KNOWN };
+        let retries = if self.version.is_empty() { RETRIES } else { RETRIES_OF_A_WEEDER };
         if !error.is_of_an_answer() || self.introduction.tries == retries {
             return self.lose(error);
         }

@@ -1,5 +1,7 @@
 //! Sessions with a firmware that may be silent, say something by itself, or be unplugged.
 
+mod lossy;
+
 use super::*;
 use crate::connection::Connection;
 use crate::{Link, Wire};
@@ -439,7 +441,10 @@ fn every_command_has_one_end_and_none_is_typed_that_ends_as_not_typed() {
                 0 if !session.is_open() => session.open(random.random()),
                 1 if step % 7 == 0 => session.lose(LinkError::Noise),
                 2..6 => {
-                    let line = format!("start {step}");
+                    // Each line occurs once. The machine shows another `k` than every second `set` sets.
+                    let [before, behind] = [1 + step % 30, 1 + step / 30].map(|count| " ".repeat(count));
+                    let set = format!("set{before}k{behind}{}", 3 + step % 2);
+                    let line = if random.random() { set } else { format!("start {step}") };
                     let deadline = now.after(Duration::from_millis(random.random_range(0..500)));
                     let number = session.command(&line, deadline).unwrap();
                     known.insert(number, Known { line, ..Known::default() });
@@ -452,7 +457,7 @@ fn every_command_has_one_end_and_none_is_typed_that_ends_as_not_typed() {
             let received = match &*session.asked.make_contiguous() {
                 [asked, ..] if random.random_ratio(3, 4) => match asked.line.as_str() {
                     VERSION => lines[3],
-                    SETTINGS => lines[4],
+                    SETTINGS | "get k" => lines[4],
                     EXAMPLES => lines[5],
                     STATUS => lines[6],
                     _ => lines[0],

@@ -93,20 +93,21 @@ fn a_set_that_is_answered_ok_has_set_this_whichever_byte_is_lost() {
             }
         });
         let k = rig.settings().get(Setting::K);
-        match ends(&happened, "set")[..] {
-            [Happening::Answered { refusal: None, .. }] => {
-                assert_eq!(k, 15, "{lost} {of_answers}");
-                is_ok += 1;
-            }
-            [Happening::Answered { .. } | Happening::Unanswered { .. }] => {}
-            ref ends => panic!("{lost} {of_answers}: {ends:?}"),
-        }
         // The last settings that the session tells are the machine's.
         let told = happened.iter().rev().find_map(|one| match one {
             Happening::Settings(settings, _) | Happening::Connected { settings, .. } => Some(settings.get(Setting::K)),
             _ => None,
         });
-        assert_eq!(told.unwrap_or(rig.settings().get(Setting::K)), k, "{lost} {of_answers}");
+        match ends(&happened, "set")[..] {
+            [Happening::Answered { refusal: None, .. }] => {
+                assert_eq!((k, told), (15, Some(15)), "{lost} {of_answers}");
+                is_ok += 1;
+            }
+            // A refused one has changed nothing.
+            [Happening::Answered { .. }] => assert_eq!((k, told), (3, None), "{lost} {of_answers}"),
+            [Happening::Unanswered { .. }] => assert_eq!(told, Some(k), "{lost} {of_answers}"),
+            ref ends => panic!("{lost} {of_answers}: {ends:?}"),
+        }
     }
     assert!(is_ok > 350, "{is_ok}");
 }
