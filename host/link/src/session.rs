@@ -10,8 +10,8 @@
 //!
 //! A session types one command at a time, and polls the status. After every start of the machine it asks for version,
 //! settings and examples, and turns the events on. After a command that changes either, it asks for them again.
-//! [`Session::hold`] does not wait, neither for an answer nor for the rest of those questions. A value that a command sets
-//! is read back.
+//! [`Session::hold`] does not wait, neither for an answer nor for the rest of those questions. The value of a `set`
+//! is read back, and typed again if it is wrong.
 //!
 //! Each command has a number, and each number one end: [`Happening::Answered`] or [`Happening::Unanswered`].
 //!
@@ -35,8 +35,7 @@ pub(crate) use self::introduction::silence;
 use self::happening::{UNTIL_HOLD, named_warning};
 use self::introduction::{INTRODUCTION, Introduction};
 use super::moment::Moment;
-use super::settings::Shown;
-use super::{ConsoleLine, EventLine, LineReader, LinkError, Mode, SURE_TRIES, Status, is_command};
+use super::{ConsoleLine, EventLine, LineReader, LinkError, Mode, Status, is_command};
 use control::alarm::Warning;
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
@@ -141,6 +140,7 @@ pub struct Session {
     held: holding::Typed,
     /// The session's own questions, typed when no command waits. `hold` does not drop them.
     own: BTreeSet<String>,
+    own_at: Duration,
     numbers: u64,
     poll_at: Duration,
     /// The waiting time in all turns so far, and the moment of the last turn.
@@ -203,8 +203,8 @@ impl Session {
 
     /// Whether no command waits for its answer.
     pub fn is_idle(&self) -> bool {
-        let is_answered = self.accepted.is_none() && self.asked.iter().all(|asked| asked.number.is_none());
-        self.waiting.is_empty() && self.to_hold.is_none() && is_answered
+        let waits = !self.waiting.is_empty() || self.to_hold.is_some() || self.accepted.is_some();
+        !waits && self.asked.iter().all(|asked| asked.number.is_none())
     }
 
     /// Whether there is a wire.
@@ -369,7 +369,9 @@ impl Session {
                     self.send(set.to_type(), None);
                 } else if let Some(Waiting { number, line, .. }) = self.waiting.pop_front() {
                     self.send(line, Some(number));
-                } else if let Some(own) = self.own.pop_first() {
+                } else if self.waited >= self.own_at
+                    && let Some(own) = self.own.pop_first()
+                {
                     self.send(own, None);
                 }
             }
@@ -482,15 +484,8 @@ impl Session {
             self.turn.happened.push(Happening::Answered { number, command, refusal });
         } else if let State::Asking(question) = self.state {
             self.take_first_answer(question, answer, refusal);
-        } else if let Some(set) = self.accepted.take_if(|set| set.to_type() == command) {
-            self.confirm(set, &answer, refusal);
-        } else if refusal.is_some() || command == SETTINGS && self.is_doubtful(&answer) {
-            // Noise may have damaged a line: ask again.
-            self.own.insert(command);
-        } else if command == SETTINGS {
-            self.turn.happened.push(Happening::Settings(Shown::by(&answer).settings, answer));
-        } else if command == EXAMPLES {
-            self.turn.happened.push(Happening::Examples(answer));
+        } else {
+            self.take_own_answer(command, answer, refusal);
         }
     }
 }

@@ -27,8 +27,8 @@ pub enum SettingsError {
     #[error("{0}. Some settings may be set and not saved: `revert` takes them back")]
     NotSaved(LinkError),
     #[error(
-        "{setting} was set to {wanted} and is {found}; nothing was saved, and `revert` takes back what is set: see to the \
-         cable and the supply, and try again"
+        "{setting} was set to {wanted} and is {found}: see to the cable and the supply, and try again. Nothing was saved, \
+         and `revert` brings the saved settings back"
     )]
     NotTaken { setting: String, wanted: u16, found: u16 },
 }

@@ -126,9 +126,9 @@ impl<'a> Talk<'a> {
                 self.command(&line);
             }
             let ended = has_all && self.waiting.is_empty();
-            // Two statuses after a command, all its events have come.
+            // Three statuses after a command, all its events have come, and both answers about changed settings.
             let is_late = self.moved_at.elapsed() > LONGEST_REPORT;
-            let has_reported = |row: &Standing| row.is_there == Some(false) || row.statuses >= 2 || is_late;
+            let has_reported = |row: &Standing| row.is_there == Some(false) || row.statuses >= 3 || is_late;
             if ended && self.is_idle() && self.standing.iter().all(has_reported) {
                 return self.end();
             }

@@ -35,6 +35,7 @@ impl Session {
         for waiting in std::mem::take(&mut self.waiting) {
             self.end(waiting.number, waiting.line, Unanswered::Held);
         }
+        self.leave_unread();
         let pending = self.asked.back().filter(|asked| asked.line == HOLD).and_then(|asked| asked.number);
         let number = pending.or(self.to_hold).unwrap_or_else(|| self.next_number());
         self.to_hold = pending.is_none().then_some(number);

@@ -9,8 +9,8 @@ use crate::{COMMAND_LENGTH, ConsoleLine, EventLine, LinkError, Status, lines};
 /// Further tries to ask for everything, if an answer is missing or belongs to another question.
 const RETRIES: usize = 2;
 
-/// The same, where a weeder has answered over this wire. To open its port again resets it, and without a session it cannot
-/// be held.
+/// The same, where a weeder has answered over this wire. To open its port again resets it, and a closed session types no
+/// `hold`.
 const RETRIES_OF_A_WEEDER: usize = 8;
 
 /// Most further questions for the settings in a try.
@@ -35,7 +35,7 @@ pub(super) struct Introduction {
     pub(super) has_held: bool,
     /// The last answer that was taken for one of those.
     pub(super) wrong: Option<LinkError>,
-    /// How often the settings were asked for again, because two answers differ.
+    /// How often the settings were asked for again, until two answers agree.
     pub(super) asked_again: usize,
     pub(super) shown: Vec<String>,
     pub(super) examples: Vec<String>,
@@ -247,8 +247,8 @@ mod tests {
             let (mut session, mut now, mut received) = (Session::default(), Moment::default(), String::new());
             let (mut answers, mut shown) = (damaged.iter().cycle(), Vec::new());
             session.open(false);
-            for turn in 0..100 {
-                if turn == 50 {
+            for turn in 0..250 {
+                if turn == 150 {
                     session.command("save", Moment::NEVER).unwrap();
                 }
                 now = now.after(Duration::from_millis(20));

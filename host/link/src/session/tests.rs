@@ -136,8 +136,9 @@ fn hold_drops_nothing_that_the_session_asks_for_itself() {
     assert!(talk.command("set wheel_mm 405"));
     assert_eq!(talk.turn().last(), Some(&typed("set wheel_mm 405")));
     talk.session().hold();
-    // The set counts as answered behind its value.
-    let held = [typed("hold"), answered("ok"), answered("ok")];
+    // A set whose value was not read back is no success.
+    let unread = answered("error: hold came before this was read back: `get` shows the value");
+    let held = [unread, typed("hold"), answered("ok")];
     assert_matches!(talk.second().split_last(), Some((Happening::Settings(..), before)) if *before == held);
 }
 

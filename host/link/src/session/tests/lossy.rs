@@ -1,6 +1,7 @@
 //! A session with the firmware's decisions over a line that loses a byte.
 
 use super::*;
+use crate::SURE_TRIES;
 use crate::settings::Setting;
 use control::ground::examples::EXAMPLES;
 use control::ground::nearest::Nearest;
@@ -112,25 +113,61 @@ fn a_set_that_is_answered_ok_has_set_this_whichever_byte_is_lost() {
     assert!(is_ok > 350, "{is_ok}");
 }
 
-#[test]
-fn a_set_that_noise_changes_each_time_is_refused() {
-    let (mut session, mut now, mut received) = (Session::default(), Moment::default(), String::new());
-    let (mut typed, mut happened) = (0, Vec::new());
+/// A session over a line that makes `wrong` of `line`, the first times that it is typed. Returns what is typed behind the
+/// connection, with a `hold` in the turn of this number, and what has happened.
+fn changed(line: &str, wrong: &str, times: usize, hold: Option<usize>) -> (String, Vec<Happening>) {
     let mut rig = Rig::new(Nearest::new(&EXAMPLES[..], Volatile::new()));
+    let (mut session, mut now, mut received) = (Session::default(), Moment::default(), String::new());
+    let (mut typed, mut happened) = (String::new(), Vec::new());
     session.open(false);
     for turn in 0..200 {
         if turn == CONNECTED {
-            session.command("set k 15", Moment::NEVER).unwrap();
+            session.command(line, Moment::NEVER).unwrap();
+            typed.clear();
+        }
+        if Some(turn) == hold.map(|after| CONNECTED + after) {
+            session.hold();
         }
         now = now.after(TURN);
         let turn = session.turn(now, received.as_bytes());
         happened.extend(turn.happened);
         let sent = String::from_utf8(turn.to_send).unwrap();
-        typed += sent.matches("set k 15").count();
-        received = rig.type_in(sent.replace("15", "1").into_bytes()).join("\r\n") + "\r\n";
+        typed += &sent;
+        let damaged = if typed.matches(line).count() <= times { sent.replace(line, wrong) } else { sent };
+        received = rig.type_in(damaged.into_bytes()).join("\r\n") + "\r\n";
     }
+    (typed, happened)
+}
+
+/// The lines of the answers to commands.
+fn answers(happened: &[Happening]) -> Vec<&str> {
+    happened
+        .iter()
+        .filter_map(|one| if let Happening::Answer(line) = one { Some(line.as_str()) } else { None })
+        .collect()
+}
+
+#[test]
+fn a_set_that_noise_changes_each_time_is_refused() {
+    let (typed, happened) = changed("set k 15", "set k 1", usize::MAX, None);
     assert!(matches!(ends(&happened, "set")[..], [Happening::Answered { refusal: Some(_), .. }]), "{happened:?}");
-    let answers: Vec<_> = happened.iter().filter(|one| matches!(one, Happening::Answer(_))).collect();
-    assert!(matches!(answers[..], [Happening::Answer(said)] if said.starts_with("error: noise")), "{answers:?}");
-    assert_eq!(typed, 1 + SURE_TRIES);
+    assert!(matches!(answers(&happened)[..], [said] if said.starts_with("error: noise")), "{happened:?}");
+    assert_eq!(typed.matches("set k 15").count(), 1 + SURE_TRIES);
+    // The machine's own reason is told, if it has one.
+    let (_, happened) = changed("set beam_to_tool_mm 100", "set beam_to_tool_mm 1000", 1, None);
+    assert!(matches!(answers(&happened)[..], [said] if said.contains("beam_to_tool_mm")), "{happened:?}");
+}
+
+#[test]
+fn nothing_is_set_behind_a_hold() {
+    for after in 0..20 {
+        let (typed, happened) = changed("set k 15", "set k 1", usize::MAX, Some(after));
+        let (_, behind) = typed.split_once("hold\n").unwrap();
+        assert!(!behind.contains("set"), "{after}: {typed}");
+        let [set, hold] = [ends(&happened, "set"), ends(&happened, HOLD)];
+        let is_answered = matches!(hold[..], [Happening::Answered { refusal: None, .. }]);
+        assert!(is_answered && set.len() == 1, "{after}: {happened:?}");
+        // The answers are in the order of the commands: a log has no other sign of which is whose.
+        assert!(answers(&happened).last() == Some(&"ok"), "{after}: {happened:?}");
+    }
 }
