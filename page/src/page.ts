@@ -85,8 +85,16 @@ tryPanel.onHappening = (happening) => {
         workSwitch.checked = true;
         simulation.work(true);
     };
-    void Promise.all(asked).then(start, () => {});
+    const drive = () => {
+        isSettled = true;
+        simulation.machine.change({ speedKmH: speed.valueAsNumber });
+    };
+    void Promise.all(asked)
+        .then(start, () => {})
+        .finally(drive);
 };
+/** Whether the machine is set up. Until then it stands: it would pass plants with other settings than are shown. */
+let isSettled = false;
 /** The event to wait for before the settings are saved. */
 let settleAt: "connected" | undefined;
 
@@ -228,7 +236,7 @@ function slider(id: string, unit: string, digits: number, change: (value: number
     input.addEventListener("input", apply);
     inLanguage(apply);
 }
-slider("speed", "kilometer-per-hour", 1, (speedKmH) => ({ speedKmH }));
+slider("speed", "kilometer-per-hour", 1, (speedKmH) => ({ speedKmH: isSettled ? speedKmH : 0 }));
 slider("spacing", "millimeter", 0, (spacingMm) => ({ spacingMm }));
 slider("weeds", "percent", 0, (share) => ({ weedShare: share / 100 }), "ofGaps");
 slider("slip", "percent", 0, (slip) => ({ slip: slip / 100 }));
