@@ -304,6 +304,8 @@ test("another Uno that is plugged in does not get what was typed for the one bef
         await part("said").locator("div", { hasText: /^ok$/ }).nth(at).waitFor();
     }
     await part("tab-settings").click();
+    // The page knows by what is saved that it is the same one.
+    await page.locator('#view-work [data-part="settings-send"]:disabled').waitFor();
     await page.locator("#work-panel [data-setting=margin_mm]").fill("31");
     await plugIn(2);
     await part("state").filter({ hasText: "hold" }).waitFor();

@@ -140,6 +140,7 @@ pub struct Session {
     held: holding::Typed,
     /// The session's own questions, typed when no command waits. `hold` does not drop them.
     own: BTreeSet<String>,
+    /// When the next one may be typed.
     own_at: Duration,
     numbers: u64,
     poll_at: Duration,
