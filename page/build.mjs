@@ -54,7 +54,7 @@ function built(/** @type {string} */ name, /** @type {string | Buffer} */ conten
     return path;
 }
 
-/** Compresses a file into a file; src/core.ts decompresses it. Zopfli's is a twentieth smaller than zlib's. */
+/** Compresses a file into a file; src/core.ts decompresses it. Zopfli packs it smaller than zlib. */
 const packed = async (/** @type {string} */ path) =>
     built(`${basename(path)}.deflated`, Buffer.from(await deflateAsync(readFileSync(path), {})));
 

@@ -112,9 +112,7 @@ impl ScriptedBoard {
         };
         let script = move |line: Option<&str>| {
             let mut state = board.state();
-            let asks = |line: &&str| {
-                ["", "version", "get", "status", "examples"].contains(&line.split_whitespace().next().unwrap_or(""))
-            };
+            let asks = |line| ["", "version", "get", "status", "examples"].contains(&line);
             state.typed.extend(line.filter(|line| !asks(line)).map(str::to_owned));
             let said = line.map_or_else(|| std::mem::take(&mut state.says), &mut answer);
             state.is_there.then_some(said)

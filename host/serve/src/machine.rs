@@ -294,7 +294,7 @@ mod tests {
         let mut told = std::iter::from_fn(|| early.try_recv().ok()).map(|message| message.text);
         assert!(told.any(|text| text.contains(r#""is":"settings""#) && text.contains("k=5 ")));
         assert_eq!(type_soon(&machine, "events off").await, ok());
-        until(|| board.typed() == ["events on", "set k 5", "events off", "events on"]).await;
+        until(|| board.typed() == ["events on", "set k 5", "get k", "events off", "events on"]).await;
     }
 
     #[tokio::test]

@@ -140,7 +140,7 @@ fn a_hold_is_typed_though_nothing_can_be_printed() {
         let board = ScriptedBoard::plugged_in();
         let ended = talk(&board, &["get k", "hold"], &mut Failing(kind));
         assert_eq!(ended.ok(), finding, "{kind}");
-        assert_eq!(board.typed()[..2], ["events on", "hold"]);
+        assert_eq!(board.typed()[..3], ["events on", "get k", "hold"]);
     }
 }
 

@@ -167,7 +167,7 @@ fn nothing_is_set_behind_a_hold() {
         let [set, hold] = [ends(&happened, "set"), ends(&happened, HOLD)];
         let is_answered = matches!(hold[..], [Happening::Answered { refusal: None, .. }]);
         assert!(is_answered && set.len() == 1, "{after}: {happened:?}");
-        // The answers are in the order of the commands: a log has no other sign of which is whose.
+        // The answers come in the order of the commands. A log pairs them by that order.
         assert!(answers(&happened).last() == Some(&"ok"), "{after}: {happened:?}");
     }
 }
