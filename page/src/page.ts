@@ -79,7 +79,6 @@ tryPanel.onHappening = (happening) => {
     if (happening.is === "started" && happening.line.includes("settings_lost")) settleAt = "connected";
     if (happening.is !== settleAt) return;
     settleAt = undefined;
-    const asked = [...simulation.machine.setUp, "save", "clear"].map((command) => tryPanel.ask(command));
     // Then the work switch is thrown, so that the first machine weeds at once.
     const start = () => {
         workSwitch.checked = true;
@@ -89,10 +88,14 @@ tryPanel.onHappening = (happening) => {
         isSettled = true;
         simulation.machine.change({ speedKmH: speed.valueAsNumber });
     };
-    void Promise.all(asked)
+    void setUp()
         .then(start, () => {})
         .finally(drive);
 };
+/** Types one command after the other: one that waits too long for those before it is not sent. */
+async function setUp(): Promise<void> {
+    for (const command of [...simulation.machine.setUp, "save", "clear"]) await tryPanel.ask(command);
+}
 /** Whether the machine is set up. Until then it stands: it would pass plants with other settings than are shown. */
 let isSettled = false;
 /** The event to wait for before the settings are saved. */

@@ -28,6 +28,7 @@ mod changes;
 mod happening;
 mod holding;
 mod introduction;
+mod typing;
 
 pub use self::happening::{Happening, Turn, Unanswered};
 pub(crate) use self::introduction::silence;
@@ -39,12 +40,6 @@ use super::{ConsoleLine, EventLine, LineReader, LinkError, Mode, Status, is_comm
 use control::alarm::Warning;
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
-
-/// Time between two polls of the status.
-const POLL: Duration = Duration::from_millis(100);
-
-/// Longest further wait of a poll for commands: between many of them the state must not become unknown.
-const BEHIND: Duration = Duration::from_millis(300);
 
 /// Longest wait for an answer.
 const PATIENCE: Duration = Duration::from_secs(3);
@@ -144,6 +139,8 @@ pub struct Session {
     own_at: Duration,
     numbers: u64,
     poll_at: Duration,
+    /// Whether the last typed line was the session's `status`.
+    is_polled: bool,
     /// The waiting time in all turns so far, and the moment of the last turn.
     waited: Duration,
     turned: Option<Moment>,
@@ -333,58 +330,6 @@ impl Session {
                 }
             }
         }
-    }
-
-    /// Types the next line, if none waits for its answer. `hold` does not wait.
-    fn type_next(&mut self) {
-        if matches!(self.state, State::Closed | State::Starting { .. }) {
-            return;
-        }
-        if self.introduction.late > 0 {
-            if self.to_hold.is_some() && !std::mem::replace(&mut self.introduction.has_held, true) {
-                self.turn.to_send.extend(HOLD.bytes().chain(*b"\n"));
-                self.introduction.late += 1;
-            }
-        } else if matches!(self.state, State::Asking(_) | State::Ready)
-            && let Some(number) = self.to_hold.take()
-        {
-            self.held.at = self.waited;
-            return self.send(HOLD.to_owned(), Some(number));
-        }
-        if !self.asked.is_empty() {
-            return;
-        }
-        match self.state {
-            State::Ready if self.is_bare => {}
-            State::Closed | State::Starting { .. } | State::Settling { .. } => {}
-            State::Asking(question) => {
-                self.introduction.bytes = 0;
-                self.send(INTRODUCTION[question].to_owned(), None);
-            }
-            State::Ready => {
-                let behind = if self.waiting.is_empty() { Duration::ZERO } else { BEHIND };
-                if self.waited >= self.poll_at + behind {
-                    self.poll_at = self.waited + POLL;
-                    self.send(STATUS.to_owned(), None);
-                } else if let Some(set) = &self.accepted {
-                    self.send(set.to_type(), None);
-                } else if let Some(Waiting { number, line, .. }) = self.waiting.pop_front() {
-                    self.send(line, Some(number));
-                } else if self.waited >= self.own_at
-                    && let Some(own) = self.own.pop_first()
-                {
-                    self.send(own, None);
-                }
-            }
-        }
-    }
-
-    fn send(&mut self, line: String, number: Option<u64>) {
-        if number.is_some() {
-            self.turn.happened.push(Happening::Command(line.clone()));
-        }
-        self.turn.to_send.extend(line.bytes().chain(*b"\n"));
-        self.asked.push_back(Asked { line, number, since: self.waited, answer: Vec::new() });
     }
 
     /// Takes a received line: a greeting, an event, or a line of an answer.

@@ -1,6 +1,7 @@
 //! Sessions with a firmware that may be silent, say something by itself, or be unplugged.
 
 mod lossy;
+mod slow;
 
 use super::*;
 use crate::connection::Connection;

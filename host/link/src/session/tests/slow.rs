@@ -1,0 +1,22 @@
+//! Sessions whose turns are far apart, as of a page in the background or on a slow computer.
+
+use super::*;
+
+#[test]
+fn whatever_the_time_between_turns_all_that_waits_is_typed_beside_the_status() {
+    for turn_ms in [1, 20, 99, 100, 150, 400, 1000, 2500] {
+        let mut talk = Talk::connected();
+        let turn = |talk: &mut Talk| {
+            let happened = talk.connection.turn(talk.now);
+            talk.now = talk.now.after(Duration::from_millis(turn_ms));
+            happened
+        };
+        assert!(talk.command("set wheel_mm 405") && talk.command("forget 1") && talk.command("get k"));
+        let happened: Vec<_> = (0..40 + 1000 / turn_ms).flat_map(|_| turn(&mut talk)).collect();
+        let count = |is: fn(&Happening) -> bool| happened.iter().filter(|happening| is(happening)).count();
+        let ends = count(|happening| matches!(happening, Happening::Answered { refusal: None, .. }));
+        let settings = count(|happening| matches!(happening, Happening::Settings(..)));
+        let statuses = count(|happening| matches!(happening, Happening::Status(..)));
+        assert!(ends == 3 && settings == 1 && statuses >= 5, "turns of {turn_ms} ms: {happened:?}");
+    }
+}
