@@ -175,7 +175,7 @@ if (what === "page") {
         outdir: "build/tests",
         outExtension: { ".js": ".mjs" },
         inject: ["tests/ready.ts"],
-        external: ["playwright-core"],
+        external: ["playwright"],
         sourcemap: "inline",
     });
 } else {

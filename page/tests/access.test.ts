@@ -3,7 +3,7 @@
 
 import assert from "node:assert/strict";
 import test, { after, before } from "node:test";
-import type { Browser, Page } from "playwright-core";
+import type { Browser, Page } from "playwright";
 import { close, launch, open } from "./browser.ts";
 import { VirtualUno } from "./ports.ts";
 import { part, pass, rollTo, tryIt } from "./trying.ts";

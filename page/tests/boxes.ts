@@ -1,7 +1,7 @@
 // Checks of parts that must be on the screen without scrolling, by their boxes.
 
 import assert from "node:assert/strict";
-import type { Page } from "playwright-core";
+import type { Page } from "playwright";
 import type { Screen } from "./browser.ts";
 
 const SCREENS = [

@@ -12,7 +12,8 @@ import { basename, extname, join, resolve } from "node:path";
 import type { TestContext } from "node:test";
 import { pathToFileURL } from "node:url";
 import type { AxeResults } from "axe-core";
-import { type Browser, chromium, firefox, type Page } from "playwright-core";
+import { type Browser, chromium, firefox, type Page } from "playwright";
+import { expect as patiently } from "playwright/test";
 import type { Simulation } from "../src/try/simulation.ts";
 import { type Device, offerPorts } from "./ports.ts";
 
@@ -23,6 +24,9 @@ declare global {
 
 /** The longest wait for anything on the page: CI's machines are slow, and share their cores. */
 export const PATIENCE_MS = 60_000;
+
+/** Waits until a part of the page is as expected. A single look, as by `assert`, may come before the page has drawn it. */
+export const expect = patiently.configure({ timeout: PATIENCE_MS });
 
 /** The screen of a page, and the browser's language if it is not American English. */
 export interface Screen {

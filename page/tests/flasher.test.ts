@@ -4,13 +4,13 @@
 import assert from "node:assert/strict";
 import { resolve } from "node:path";
 import test, { after, before } from "node:test";
-import type { Browser, Page } from "playwright-core";
+import type { Browser, Page } from "playwright";
 import { hex } from "../src/core.ts";
 import { BOARDS, type Board, Bootloader } from "../src/flasher/stk500.ts";
 import type { SerialLine } from "../src/link/serial.ts";
 import { FLASH_BYTES } from "../src/uno/chip.ts";
 import { readHex, usedBytes } from "../src/uno/hex.ts";
-import { close, inspect, launch, open, PHONE, served } from "./browser.ts";
+import { close, expect, inspect, launch, open, PHONE, served } from "./browser.ts";
 import { type Device, Foreign, offerPorts, VirtualUno } from "./ports.ts";
 
 const FIRMWARE = resolve("../target/avr-none/firmware/weeder-firmware.elf");
@@ -38,7 +38,7 @@ async function said(device: Device): Promise<string> {
     const opened = await open(browser, "flash", undefined, [device]);
     const text = await flash(opened.page);
     assert.match(text, /^Not flashed: .*\.$/);
-    assert(await opened.page.getByRole("button", { name: "Flash it" }).isEnabled());
+    await expect(opened.page.getByRole("button", { name: "Flash it" })).toBeEnabled();
     await close(opened);
     return text;
 }
@@ -246,7 +246,7 @@ test("a browser without Web Serial is told so, with the HEX and the command that
     });
     await page.goto(new URL("dist/index.html#flash", `file://${process.cwd()}/`).href);
     await page.locator("#view-flash").getByText("This browser has no Web Serial.").waitFor();
-    assert(await page.getByRole("button", { name: "Flash it" }).isDisabled());
+    await expect(page.getByRole("button", { name: "Flash it" })).toBeDisabled();
     const download = page.waitForEvent("download");
     await page.getByRole("button", { name: "Save the HEX as a file" }).click();
     const file = await download;
@@ -266,7 +266,7 @@ test("over plain http from another computer the page says why there is no port, 
         .locator("#view-work")
         .getByText(/plain http.* Open the page's folder on the computer that has the Uno/)
         .waitFor();
-    assert(await page.getByRole("button", { name: "Connect an Uno" }).isDisabled());
+    await expect(page.getByRole("button", { name: "Connect an Uno" })).toBeDisabled();
     await inspect(page, "phone-plain-http");
     await page.close();
 });

@@ -2,7 +2,7 @@
 
 import { resolve } from "node:path";
 import type { TestContext } from "node:test";
-import type { Browser, Page } from "playwright-core";
+import type { Browser, Page } from "playwright";
 import { DESK, type Opened, open } from "./browser.ts";
 import { type Device, VirtualUno } from "./ports.ts";
 

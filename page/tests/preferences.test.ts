@@ -2,8 +2,8 @@
 
 import assert from "node:assert/strict";
 import test, { after, before } from "node:test";
-import type { Browser, Page } from "playwright-core";
-import { close, launch, open, reload } from "./browser.ts";
+import type { Browser, Page } from "playwright";
+import { close, expect, launch, open, reload } from "./browser.ts";
 import { part, pass, tryIt } from "./trying.ts";
 
 let browser: Browser;
@@ -26,24 +26,23 @@ test("theme, sound and board are kept from one visit to the next", async () => {
     const opened = await open(browser, "flash");
     const { page } = opened;
     const [light, sound] = [page.getByRole("button", { name: "Light" }), page.getByRole("button", { name: "Sound" })];
-    const board = page.locator("[data-part=board]");
-    const shown = async () => [
-        await light.getAttribute("aria-pressed"),
-        await page.evaluate(() => getComputedStyle(document.documentElement).colorScheme),
-        await sound.getAttribute("aria-pressed"),
-        await board.inputValue(),
-    ];
-    const options = await board
+    const boards = page.locator("[data-part=board]");
+    const shows = async (isLight: string, scheme: string, isHeard: string, board: string) => {
+        await expect(light).toHaveAttribute("aria-pressed", isLight);
+        await expect(page.locator("html")).toHaveCSS("color-scheme", scheme);
+        await expect(sound).toHaveAttribute("aria-pressed", isHeard);
+        await expect(boards).toHaveValue(board);
+    };
+    const [first = "", second = ""] = await boards
         .locator("option")
         .evaluateAll((options) => options.map((option) => (option as HTMLOptionElement).value));
-    assert.deepEqual(await shown(), ["false", "light dark", "true", options[0]]);
+    await shows("false", "light dark", "true", first);
     await light.click();
     await sound.click();
-    await board.selectOption(options[1] ?? "");
-    const chosen = ["true", "light", "false", options[1]];
-    assert.deepEqual(await shown(), chosen);
+    await boards.selectOption(second);
+    await shows("true", "light", "false", second);
     await reload(page);
-    assert.deepEqual(await shown(), chosen);
+    await shows("true", "light", "false", second);
     await close(opened);
 });
 
@@ -53,7 +52,7 @@ test("where little motion is asked for, the machine stands until it is driven, a
     await page.emulateMedia({ reducedMotion: "reduce" });
     await reload(page);
     await page.getByRole("link", { name: "Try" }).click();
-    assert.equal(await page.locator("#speed-is").textContent(), "0.0 km/h");
+    await expect(page.locator("#speed-is")).toHaveText("0.0 km/h");
     await pass(page, 1);
     assert.equal(await page.evaluate(() => globalThis.simulation.machine.placeMm), 0);
     await page.locator("#speed").fill("2");
@@ -90,7 +89,7 @@ test("an alarm, a lost machine and an obeyed HOLD are each heard and felt as ano
     });
     const sound = page.getByRole("button", { name: "Sound" });
     await sound.click();
-    assert.equal(await sound.getAttribute("aria-pressed"), "false");
+    await expect(sound).toHaveAttribute("aria-pressed", "false");
     await heard(page);
     await part(page, "hold").click();
     await pass(page, 0.5);

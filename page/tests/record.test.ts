@@ -5,8 +5,8 @@ import { execFileSync } from "node:child_process";
 import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import test, { after, before } from "node:test";
-import type { Browser, Page } from "playwright-core";
-import { close, inspect, launch, type Opened, open, openAt } from "./browser.ts";
+import type { Browser, Page } from "playwright";
+import { close, expect, inspect, launch, type Opened, open, openAt } from "./browser.ts";
 import { folder, plugIn, serve } from "./serving.ts";
 import { part, tryIt } from "./trying.ts";
 import { WEEDER } from "./weeder.ts";
@@ -100,8 +100,8 @@ test("a file that is no log is told, and so is one without a machine", async () 
         ["none.csv", /^none\.csv has no machine in it\./],
     ] as const) {
         const opened = await openLog(`build/files/${file}`);
-        assert.match((await inView(opened.page, "log-said").textContent()) ?? "", said);
-        assert(await inView(opened.page, "log-body").isHidden());
+        await expect(inView(opened.page, "log-said")).toHaveText(said);
+        await expect(inView(opened.page, "log-body")).toBeHidden();
         await close(opened);
     }
 });
@@ -113,8 +113,9 @@ test("a log that lacks the settings behind revert says from when on it is not dr
     const lines = ["time_ms,kind,line", ...connected, status(0), status(2000), ...reverted, status(9000)];
     writeFileSync("build/files/reverted.csv", `${lines.join("\n")}\n`);
     const opened = await openLog("build/files/reverted.csv");
-    const said = (await inView(opened.page, "log-said").textContent()) ?? "";
-    assert.match(said, /^reverted\.csv: .* From 9\.0 sec on nothing is drawn or counted, /);
+    await expect(inView(opened.page, "log-said")).toHaveText(
+        /^reverted\.csv: .* From 9\.0 sec on nothing is drawn or counted, /,
+    );
     await close(opened);
 });
 
@@ -152,7 +153,7 @@ test("a finger moves the rows also in a browser that does not tell its movement"
         ] as const)
             rows.dispatchEvent(new PointerEvent(type, { isPrimary: true, buttons: 1, clientX }));
     });
-    assert(Number(await inView(opened.page, "log-place").inputValue()) > 0);
+    await expect(inView(opened.page, "log-place")).not.toHaveValue("0");
     await close(opened);
 });
 
@@ -223,7 +224,7 @@ test("logs of several rows are moved together, and their map is that of weeder",
         .filter({ hasText: /^left\.csv: .* 60 detections, .* right\.csv: .* 60 detections, / })
         .waitFor();
     const rows = inView(page, "log-drawing");
-    assert.equal(await rows.count(), 2);
+    await expect(rows).toHaveCount(2);
     await inView(page, "log-place").fill("20000");
     await inView(page, "log-closer").click();
     // Three statuses of a second are read, and the nearest is shown.
@@ -284,7 +285,7 @@ test("a log of a day opens, is moved through with only what is in the window, an
     await inView(page, "log-file").setInputFiles("build/files/day.csv");
     await inView(page, "log-said").filter({ hasText: /./ }).waitFor();
     const openMs = performance.now() - startedMs;
-    assert.match((await inView(page, "log-said").textContent()) ?? "", new RegExp(`, ${hours} alarms`));
+    await expect(inView(page, "log-said")).toHaveText(new RegExp(`, ${hours} alarms`));
     for (let presses = 0; presses < 8; presses++) await inView(page, "log-farther").click();
     const { perFrameMs, most, texts } = await page.evaluate(async () => {
         const place = document.querySelector<HTMLInputElement>("[data-part=log-place]");
@@ -322,7 +323,8 @@ test("a log of a day opens, is moved through with only what is in the window, an
     const before = await share();
     await inView(page, "log-cancel").click();
     await inView(page, "log-replayed").filter({ hasText: "Cancelled." }).waitFor();
-    assert(before < 1 && (await inView(page, "log-busy").isHidden()));
+    assert(before < 1);
+    await expect(inView(page, "log-busy")).toBeHidden();
     await close(opened);
 });
 

@@ -4,7 +4,7 @@
 import assert from "node:assert/strict";
 import { join } from "node:path";
 import test from "node:test";
-import type { Browser } from "playwright-core";
+import type { Browser } from "playwright";
 import { LANGUAGES } from "../src/words/words.ts";
 import { assertOnScreen } from "./boxes.ts";
 import { close, launch, launchFirefox, openAt, PHONE } from "./browser.ts";

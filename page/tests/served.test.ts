@@ -3,8 +3,8 @@
 import assert from "node:assert/strict";
 import { join } from "node:path";
 import test, { after, before } from "node:test";
-import type { Browser } from "playwright-core";
-import { close, inspect, launch, openAt, PHONE } from "./browser.ts";
+import type { Browser } from "playwright";
+import { close, expect, inspect, launch, openAt, PHONE } from "./browser.ts";
 import { end, folder, part, plugIn, serve } from "./serving.ts";
 
 let browser: Browser;
@@ -34,16 +34,16 @@ test("a phone is paired by the code, sees the machine, and holds it", async (tes
     await page.getByRole("button", { name: "Pair this phone" }).click();
 
     await part(page, "uno", "alarm-name").filter({ hasText: "Alarm 5-1 settings_lost" }).waitFor();
-    assert(await part(page, "uno", "clear").isHidden());
+    await expect(part(page, "uno", "clear")).toBeHidden();
     for (const line of ["save", "clear", "start"]) await served.type(line);
     await part(page, "uno", "state").filter({ hasText: "work" }).waitFor();
     await part(page, "uno", "last-object")
         .filter({ hasText: /mm wide/ })
         .waitFor();
-    assert.match((await part(page, "uno", "speed").textContent()) ?? "", /^\d\.\d$/);
+    await expect(part(page, "uno", "speed")).toHaveText(/^\d\.\d$/);
     await part(page, "uno", "limits").filter({ hasText: "watched and held" }).waitFor();
     for (const name of ["start", "teach-plant", "tab-calibrate"])
-        assert(await part(page, "uno", name).isHidden(), `${name} is not offered`);
+        await expect(part(page, "uno", name), `${name} is not offered`).toBeHidden();
     await inspect(page, "phone-served");
     const hold = await part(page, "uno", "hold").boundingBox();
     assert(hold && hold.width > 300 && hold.height >= 80 && hold.y + hold.height <= PHONE.height, "HOLD is at hand");
@@ -70,7 +70,7 @@ test("a phone is paired by the code, sees the machine, and holds it", async (tes
 
     await page.getByRole("link", { name: "Flash" }).click();
     await page.getByText(/comes from weeder serve, which .* flashes nothing/).waitFor();
-    assert(await page.getByRole("button", { name: "Flash it" }).isDisabled());
+    await expect(page.getByRole("button", { name: "Flash it" })).toBeDisabled();
     // The browser itself writes down the HOLDs to the lost machine.
     await close({ page, errors: opened.errors.filter((error) => !error.includes("status of 503")) });
 });
@@ -86,12 +86,12 @@ test("the address with the code pairs by itself, and machines side by side are s
     assert(!page.url().includes(served.code), page.url());
     await part(page, "right", "start").click();
     await part(page, "right", "state").filter({ hasText: "work" }).waitFor();
-    assert.equal(await part(page, "left", "state").textContent(), "hold");
+    await expect(part(page, "left", "state")).toHaveText("hold");
     await inspect(page, "phone-served-two");
     // The computer itself needs no code, and shows the whole panel.
     const here = await openAt(browser, served.here);
     await part(here.page, "right", "state").filter({ hasText: "work" }).waitFor();
-    assert(await part(here.page, "right", "tab-calibrate").isVisible());
+    await expect(part(here.page, "right", "tab-calibrate")).toBeVisible();
     await inspect(here.page, "desk-served-two");
     // A HOLD that is lost says so, and is sent again until it is obeyed. Until then nothing starts.
     let isLost = true;
@@ -103,7 +103,7 @@ test("the address with the code pairs by itself, and machines side by side are s
     for (const hold of [() => part(page, "right", "hold").click(), () => enter("hold.")]) {
         await hold();
         await part(page, "right", "drive-said").filter({ hasText: "HOLD has not come through" }).waitFor();
-        assert.equal(await part(page, "right", "state").textContent(), "work");
+        await expect(part(page, "right", "state")).toHaveText("work");
         await part(page, "right", "start").click();
         await part(page, "right", "drive-said").filter({ hasText: "so this was not sent" }).waitFor();
         await enter("start now");
@@ -130,7 +130,7 @@ test("the address with the code pairs by itself, and machines side by side are s
         const setting = part(shown, "right", "settings-list").getByRole("listitem", { includeHidden: true });
         const help = /^k\s*nearest examples that vote \(1 to 15, default 3; 3 is saved\)$/;
         await setting.filter({ hasText: help }).waitFor({ state: "attached" });
-        assert.equal(await part(shown, "right", "settings-list").locator('[data-setting="k"]').inputValue(), "5");
+        await expect(part(shown, "right", "settings-list").locator('[data-setting="k"]')).toHaveValue("5");
     }
     await close(late);
 
@@ -141,7 +141,7 @@ test("the address with the code pairs by itself, and machines side by side are s
             document.dispatchEvent(new Event("visibilitychange"));
         }, hidden);
     await hide(true);
-    assert.equal(await part(here.page, "left", "state").textContent(), "hold");
+    await expect(part(here.page, "left", "state")).toHaveText("hold");
     const front = await here.page.context().newPage();
     await front.goto(served.here);
     await part(here.page, "left", "why").filter({ hasText: "No machine is connected." }).waitFor();
@@ -172,7 +172,7 @@ test("the address with the code pairs by itself, and machines side by side are s
         .getByRole("listitem")
         .filter({ hasText: /right\s*hold/ })
         .waitFor();
-    assert.equal(await part(page, "left", "state").textContent(), "hold");
+    await expect(part(page, "left", "state")).toHaveText("hold");
     // The browser itself writes down the request that was taken from it.
     const errors = opened.errors.filter((error) => !error.includes("net::ERR_FAILED"));
     for (const ended of [here, { page, errors }]) await close(ended);

@@ -9,7 +9,7 @@ import { join, resolve } from "node:path";
 import { createInterface } from "node:readline";
 import type { TestContext } from "node:test";
 import { setTimeout as wait } from "node:timers/promises";
-import type { Locator, Page } from "playwright-core";
+import type { Locator, Page } from "playwright";
 import { WEEDER } from "./weeder.ts";
 
 const FIRMWARE = resolve("../target/avr-none/firmware/weeder-firmware.elf");

@@ -1,9 +1,8 @@
 // The steps of the set-up in the panel, at a virtual Uno in a real browser.
 
-import assert from "node:assert/strict";
 import test, { after, before } from "node:test";
-import type { Browser } from "playwright-core";
-import { close, inspect, launch, PHONE } from "./browser.ts";
+import type { Browser } from "playwright";
+import { close, expect, inspect, launch, PHONE } from "./browser.ts";
 import { atHold, part, type } from "./panel.ts";
 
 let browser: Browser;
@@ -19,13 +18,13 @@ test("the steps of the set-up take a value each, set and save it, and keep what 
     await page.getByRole("tab", { name: "Calibrate" }).click();
     const steps = part(page, "set-up-steps");
     const beam = steps.locator("[data-step=beam_to_tool_mm]");
-    assert.equal(await beam.inputValue(), "400");
-    assert.equal(await steps.getByLabel("ticks_per_rev", { exact: true }).inputValue(), "2400");
+    await expect(beam).toHaveValue("400");
+    await expect(steps.getByLabel("ticks_per_rev", { exact: true })).toHaveValue("2400");
     const step = steps.locator("li").filter({ has: page.locator("[data-step=beam_to_tool_mm]") });
     await beam.fill("4000");
     await step.getByRole("button", { name: "Set and save" }).click();
     await step.getByText("beam_to_tool_mm takes a whole number from").waitFor();
-    assert.equal(await beam.inputValue(), "4000");
+    await expect(beam).toHaveValue("4000");
     await beam.fill("430");
     await step.getByRole("button", { name: "Set and save" }).click();
     await step.getByText("Saved.").waitFor();
@@ -39,7 +38,7 @@ test("the steps of the set-up take a value each, set and save it, and keep what 
     await stem.locator("[data-step=servo_out_us]").fill("1750");
     await stem.getByRole("button", { name: "Set and save" }).click();
     await stem.getByText("together need a beam_to_tool_mm of").waitFor();
-    assert.equal(await part(page, "said").getByText("set servo_out_us").count(), 0);
+    await expect(part(page, "said").getByText("set servo_out_us")).toHaveCount(0);
     await stem.locator("[data-step=lead_out_ms]").fill("156");
     await stem.getByRole("button", { name: "Set and save" }).click();
     await stem.getByText("✓ Done").waitFor();
@@ -55,6 +54,6 @@ test("the steps of the set-up take a value each, set and save it, and keep what 
     await steps.getByRole("button", { name: "Swing six times" }).click();
     await steps.getByText("The tool swings in and out six times.").waitFor();
     await page.locator("#language").selectOption("fr");
-    assert.equal(await beam.inputValue(), "430");
+    await expect(beam).toHaveValue("430");
     await close({ page, errors });
 });

@@ -1,6 +1,7 @@
 // Shared code of the tests of "Try it": the page after its machine is set up, and time on its chip.
 
-import type { Browser, Locator, Page } from "playwright-core";
+import assert from "node:assert/strict";
+import type { Browser, Locator, Page } from "playwright";
 import { DESK, type Opened, open } from "./browser.ts";
 
 export const part = (page: Page, name: string): Locator => page.locator(`#try-panel [data-part="${name}"]`);
@@ -18,12 +19,20 @@ export async function tryIt(browser: Browser, viewport = DESK): Promise<Opened> 
 /** Waits until the machine is set up, and has begun to weed. */
 export async function weeds(page: Page): Promise<void> {
     const state = part(page, "state").filter({ hasText: "work" });
-    while (!(await state.isVisible())) await pass(page, 0.1);
+    await passUntil(page, 0.1, () => state.isVisible());
 }
 
 /** Lets time pass in the page until the tool has reached a position along the row, as fast as this machine can. */
 export async function rollTo(page: Page, toolMm: number): Promise<void> {
-    while (await page.evaluate((mm) => globalThis.simulation.machine.toolMm < mm, toolMm)) await pass(page, 0.5);
+    await passUntil(page, 0.5, () => page.evaluate((mm) => globalThis.simulation.machine.toolMm >= mm, toolMm));
+}
+
+/** Lets time pass in such steps until something is so. Fails after a minute on the chip. */
+async function passUntil(page: Page, seconds: number, isSo: () => Promise<boolean>): Promise<void> {
+    for (let left = 60; !(await isSo()); left -= seconds) {
+        assert(left > 0, `the machine says ${(await part(page, "said").locator("div").allTextContents()).join(" / ")}`);
+        await pass(page, seconds);
+    }
 }
 
 /**

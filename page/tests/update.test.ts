@@ -6,8 +6,8 @@ import { cpSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:f
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
 import test, { after, before, type TestContext } from "node:test";
-import type { Browser } from "playwright-core";
-import { close, inspect, launch, type Opened, open, openAt, PHONE, reload, served } from "./browser.ts";
+import type { Browser } from "playwright";
+import { close, expect, inspect, launch, type Opened, open, openAt, PHONE, reload, served } from "./browser.ts";
 import { type Device, VirtualUno } from "./ports.ts";
 
 const FIRMWARE = resolve("../target/avr-none/firmware/weeder-firmware.elf");
@@ -72,23 +72,23 @@ test("from localhost the page can be installed, opens without a network, and say
         [],
     );
     const newer = page.getByText("A newer page is there.");
-    assert(await newer.isHidden());
+    await expect(newer).toBeHidden();
 
     rebuild(folder, second);
     await page.reload();
     await newer.waitFor();
     await inspect(page, "desk-newer");
-    assert.equal(await page.locator("h1").textContent(), "weeder");
+    await expect(page.locator("h1")).toHaveText("weeder");
     const other = await page.context().newPage();
     // The server may have another page beside it.
     writeFileSync(join(folder, "other.html"), "<h1>other");
     await other.goto(address.replace("#work", "other.html"));
-    assert.equal(await other.locator("h1").textContent(), "other");
+    await expect(other.locator("h1")).toHaveText("other");
     await other.goto(address);
     await page.getByRole("button", { name: "Load it" }).click();
     await page.locator("h1", { hasText: "weeder 2" }).waitFor();
     // The other tab has the button too, and the newer page is already there.
-    assert.equal(await other.locator("h1").textContent(), "weeder");
+    await expect(other.locator("h1")).toHaveText("weeder");
     await other.getByRole("button", { name: "Load it" }).click();
     await other.locator("h1", { hasText: "weeder 2" }).waitFor();
     await page.waitForFunction(async () => (await caches.keys()).length === 1);
@@ -213,14 +213,14 @@ test("an Uno with another firmware is told with what changes, and gets its setti
     await page.getByRole("button", { name: "Flash it" }).click();
     await page.getByRole("button", { name: "Work with it" }).click();
     await part("alarm-name").filter({ hasText: "settings_lost" }).waitFor();
-    assert(await part("update").isHidden());
+    await expect(part("update")).toBeHidden();
     await part("restore-go").click();
     await part("restore-said")
         .filter({ hasText: "The settings of before are saved. This firmware has no no_crop_m." })
         .waitFor();
-    assert.equal(await page.locator("#work-panel [data-setting=margin_mm]").inputValue(), "40");
+    await expect(page.locator("#work-panel [data-setting=margin_mm]")).toHaveValue("40");
     await part("state").filter({ hasText: "hold" }).waitFor();
-    assert(await part("restore").isHidden());
+    await expect(part("restore")).toBeHidden();
     await close(opened);
 });
 
@@ -250,7 +250,7 @@ test("kept settings can be put back until the machine has saved them, with the c
         .filter({ hasText: /^The settings of before are saved\.$/ })
         .waitFor();
     await again();
-    assert(await part("restore").isHidden());
+    await expect(part("restore")).toBeHidden();
     // The factory's lead of the version with the old gap is not safe.
     for (const [name, value] of Object.entries({
         wheel_mm: 410,
@@ -258,7 +258,7 @@ test("kept settings can be put back until the machine has saved them, with the c
         merge_gap_mm: 54,
         lead_out_ms: 230,
     }))
-        assert.equal(await page.locator(`#work-panel [data-setting=${name}]`).inputValue(), String(value), name);
+        await expect(page.locator(`#work-panel [data-setting=${name}]`), name).toHaveValue(String(value));
     await close(opened);
 });
 
@@ -275,7 +275,7 @@ test("another Uno is not said to have restarted at work because the one before w
     await page.getByRole("button", { name: "Disconnect" }).click();
     await page.getByRole("button", { name: "Connect an Uno" }).click();
     await part("alarm-name").filter({ hasText: "settings_lost" }).waitFor();
-    assert.match((await part("alarm-advice").textContent()) ?? "", /^Check get, /);
+    await expect(part("alarm-advice")).toHaveText(/^Check get, /);
     await close(opened);
 });
 

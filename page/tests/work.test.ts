@@ -4,8 +4,8 @@ import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import test, { after, before, type TestContext } from "node:test";
-import type { Browser, Page } from "playwright-core";
-import { close, DESK, inspect, launch, moving, PHONE } from "./browser.ts";
+import type { Browser, Page } from "playwright";
+import { close, DESK, expect, inspect, launch, moving, PHONE } from "./browser.ts";
 import * as panel from "./panel.ts";
 import { FIRMWARE, part, type } from "./panel.ts";
 import { type Device, Foreign, VirtualUno } from "./ports.ts";
@@ -32,10 +32,7 @@ test("a new board shows its alarm with what to do, works, and holds, and all of 
     const { page } = opened;
     await moving(page);
     await part(page, "alarm-name").filter({ hasText: "Alarm 5-1 settings_lost" }).waitFor();
-    assert.match(
-        (await part(page, "alarm-advice").textContent()) ?? "",
-        /^Check get, set what differs, save, clear\.$/,
-    );
+    await expect(part(page, "alarm-advice")).toHaveText(/^Check get, set what differs, save, clear\.$/);
     await inspect(page, "phone-alarm");
     await assertOnOneScreen(page, ["state", "why", "alarm-advice", "clear", "strip", "speed", "hold", "start"]);
     await part(page, "start").click();
@@ -52,8 +49,8 @@ test("a new board shows its alarm with what to do, works, and holds, and all of 
         .filter({ hasText: /plant, 1\d\d mm wide, \d vote/ })
         .waitFor();
     await part(page, "why").filter({ hasText: "A plant is at the tool" }).waitFor();
-    assert((await page.locator("#work-panel .canopy").count()) > 0, "a window is drawn");
-    assert.match((await part(page, "speed").textContent()) ?? "", /^2\.[3-7]$/);
+    await expect(page.locator("#work-panel .canopy"), "a window is drawn").not.toHaveCount(0);
+    await expect(part(page, "speed")).toHaveText(/^2\.[3-7]$/);
     await page.evaluate(() => globalThis.scrollTo(0, 0));
     await inspect(page, "phone-work");
     await assertOnOneScreen(page, "state why strip speed place teach-plant teach-weed hold start".split(" "));
@@ -105,7 +102,8 @@ test("a setting that is sent is saved, and there after a reset", async (test) =>
     await part(page, "state").filter({ hasText: "no machine" }).waitFor();
     await page.getByRole("button", { name: "Connect an Uno" }).click();
     await part(page, "state").filter({ hasText: "hold" }).waitFor();
-    assert.deepEqual([await margin.inputValue(), await part(page, "settings-said").textContent()], ["55", ""]);
+    await expect(margin).toHaveValue("55");
+    await expect(part(page, "settings-said")).toHaveText("");
     await close({ page, errors });
 });
 
@@ -175,7 +173,7 @@ test("a cable that is pulled at work is told, and the machine is there again whe
                 /The port is gone: its cable was pulled.*plug it in again.*weeds on: its work switch takes the tool out/,
         })
         .waitFor();
-    assert(await part(page, "start").isDisabled());
+    await expect(part(page, "start")).toBeDisabled();
     await page.getByText("If it does not connect by itself, press Connect an Uno.").waitFor();
     await inspect(page, "desk-pulled");
     await page.getByRole("link", { name: "Log" }).click();
@@ -290,15 +288,16 @@ test("the servo is calibrated by eye, and timed, while the machine stands", asyn
     await plugIn(page);
     await part(page, "state").filter({ hasText: "hold" }).waitFor();
     await part(page, "margin-said").filter({ hasText: "(1 of 2 done)" }).waitFor();
-    assert(await mark.isChecked());
+    await expect(mark).toBeChecked();
     // A reset has taken the tool out.
-    const pulse = part(page, "servo-pulse");
-    assert.deepEqual([await pulse.inputValue(), await part(page, "servo-said").textContent()], ["2000", ""]);
+    await expect(part(page, "servo-pulse")).toHaveValue("2000");
+    await expect(part(page, "servo-said")).toHaveText("");
     await page.getByRole("button", { name: "Disconnect" }).click();
     await page.getByRole("button", { name: "Connect an Uno" }).click();
     await part(page, "state").filter({ hasText: "hold" }).waitFor();
     await part(page, "margin-said").filter({ hasNotText: "(1 of 2 done)" }).waitFor();
-    assert.deepEqual([await mark.isChecked(), await beam.inputValue()], [false, "400"]);
+    await expect(mark).not.toBeChecked();
+    await expect(beam).toHaveValue("400");
     await type(page, "set servo_out_us 1900");
     await page.waitForFunction(
         () => document.querySelector<HTMLInputElement>("#work-panel [data-part=servo-pulse]")?.value === "1900",
