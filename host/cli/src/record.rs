@@ -5,7 +5,7 @@ use crate::ports::{Chosen, Ports};
 use crate::receiver::GpsArguments;
 use anyhow::{Result, bail, ensure};
 use clap::Args;
-use frame::{Messages, OutName, Replace};
+use frame::{Messages, OutName, Printed, Replace, printing_aside};
 use link::advice;
 use link::rows::{Heard, Rows, What};
 use link::session::Happening;
@@ -17,8 +17,6 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 const LOOK: Duration = Duration::from_millis(20);
-/// Most events between two looks at the receiver.
-const MOST_EVENTS: usize = 64;
 
 #[derive(Args)]
 #[command(after_help = "\
@@ -42,6 +40,11 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
+    // A terminal that takes nothing delays no line of a log.
+    printing_aside(&mut io::sink(), |lines| record(arguments, &|line| drop(lines.send(Printed::Message(line)))))
+}
+
+fn record(arguments: &Arguments, tell: &dyn Fn(String)) -> Result<()> {
     let chosen = arguments.ports.choose(arguments.gps.port())?;
     let gps = arguments.gps.open(&chosen)?;
     let mut logs = Logs::open(&arguments.out, &chosen)?;
@@ -52,45 +55,51 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let mut gps = gps.map(|(receiver, _)| receiver);
     let (rows, _) = open(&chosen)?;
     let stop = ctrl_c()?;
-    writeln!(Messages, "Recording into {}, Ctrl-C ends it", arguments.out.display());
+    tell(format!("Recording into {}, Ctrl-C ends it", arguments.out.display()));
     while !stop.load(Ordering::Relaxed) {
         if let Some(gps) = &mut gps {
             let time_ms = logs.time_ms(gps.row, Instant::now());
             let said = gps.turn(time_ms, Instant::now());
             let written = logs.write(gps.row, |log| log.lines_at(time_ms, &said));
-            logs.go_on_after(written, gps.row, &chosen)?;
+            logs.go_on_after(written, gps.row, &chosen, tell)?;
             for (kind, line) in &said {
                 if let Kind::GpsFound | Kind::GpsLost | Kind::GpsMark = kind {
-                    writeln!(Messages, "Receiver: {line}");
+                    tell(format!("Receiver: {line}"));
                 }
             }
         }
-        // All that waits: a read of the receiver may take 16 ms on Windows, in which several events come.
-        let mut patience = LOOK;
-        for _ in 0..MOST_EVENTS {
-            let Some(heard) = rows.next(patience) else { break };
+        // All that waits: a read of the receiver may take 16 ms on Windows, and a busy disk seconds, in which many events come.
+        // The receiver's next line is later than these.
+        let (began, mut patience) = (Instant::now(), LOOK);
+        while let Some(heard) = rows.next(patience) {
+            let is_new = heard.at > began;
             patience = Duration::ZERO;
             let written = logs.take(&heard);
-            logs.go_on_after(written, heard.row, &chosen)?;
-            let What::Happened(happening) = heard.what else { continue };
-            if let Some(gps) = gps.as_mut().filter(|gps| gps.row == heard.row) {
-                gps.happened(logs.time_ms(heard.row, heard.at), &happening);
+            logs.go_on_after(written, heard.row, &chosen, tell)?;
+            if let What::Happened(happening) = heard.what {
+                if let Some(gps) = gps.as_mut().filter(|gps| gps.row == heard.row) {
+                    gps.happened(logs.time_ms(heard.row, heard.at), &happening);
+                }
+                tell_of(&chosen, heard.row, happening, tell);
             }
-            tell_of(&chosen, heard.row, happening);
+            if is_new {
+                break;
+            }
         }
     }
     if let Some(gps) = &gps {
-        writeln!(Messages, "{}", gps.summary());
+        tell(gps.summary().to_string());
     }
-    logs.end()
+    logs.end(tell)
 }
 
-fn tell_of(chosen: &Chosen, row: usize, happening: Happening) {
+fn tell_of(chosen: &Chosen, row: usize, happening: Happening, tell: &dyn Fn(String)) {
+    let tell = |what: &str| tell(chosen.under_name(row, what));
     match happening {
         Happening::Connected { version, shown, .. } => {
-            writeln!(Messages, "{}", chosen.under_name(row, &format!("weeder {version} is there")));
+            tell(&format!("weeder {version} is there"));
             if let Some(other) = other_version(&version, &shown) {
-                writeln!(Messages, "{}", chosen.under_name(row, &other));
+                tell(&other);
             }
         }
         Happening::Started { while_at_work: Some(cause), .. } => {
@@ -99,9 +108,9 @@ fn tell_of(chosen: &Chosen, row: usize, happening: Happening) {
                 // As for `Messages`: a bell that fails ends no record.
                 let _ = errors.write_all(b"\x07");
             }
-            writeln!(Messages, "{}", chosen.under_name(row, &advice::restarted(&cause)));
+            tell(&advice::restarted(&cause));
         }
-        Happening::Lost(why) => writeln!(Messages, "{}", chosen.under_name(row, &why)),
+        Happening::Lost(why) => tell(&why),
         _ => {}
     }
 }
@@ -171,22 +180,28 @@ impl Logs {
     }
 
     /// Reports a log that could not be written. The other rows' logs continue. Fails if no log is left.
-    fn go_on_after(&self, written: Result<(), LogError>, row: usize, chosen: &Chosen) -> Result<()> {
+    fn go_on_after(
+        &self,
+        written: Result<(), LogError>,
+        row: usize,
+        chosen: &Chosen,
+        tell: &dyn Fn(String),
+    ) -> Result<()> {
         if let Err(error) = written {
-            writeln!(Messages, "error: {}", chosen.under_name(row, &format!("{:#}", anyhow::Error::from(error))));
+            tell(format!("error: {}", chosen.under_name(row, &format!("{:#}", anyhow::Error::from(error)))));
             ensure!(self.0.iter().any(|log| log.is_written), "no log can be written any more");
         }
         Ok(())
     }
 
     /// Says what is in them, and fails if one could not be written.
-    fn end(&self) -> Result<()> {
+    fn end(&self, tell: &dyn Fn(String)) -> Result<()> {
         for Log { path, writer, .. } in &self.0 {
             let now = match writer.check() {
                 Ok(()) => format!("{} has {} now", path.display(), writer.lines()),
                 Err(why) => why.to_string(),
             };
-            writeln!(Messages, "{} lines were added: {now}", writer.added);
+            tell(format!("{} lines were added: {now}", writer.added));
         }
         self.check()?;
         Ok(self.0.iter().try_for_each(|log| log.writer.check())?)

@@ -34,7 +34,8 @@ impl Connection {
     }
 
     /// Reads, types, and returns what happened since the last turn.
-    pub fn turn(&mut self, now: Moment) -> Vec<Happening> {
+    pub fn turn(&mut self, clock: impl Fn() -> Moment) -> Vec<Happening> {
+        let now = clock();
         if self.wire.is_none() && self.tried.is_none_or(|tried| now.since(tried) >= RETRY) {
             self.tried = Some(now);
             match (self.open)() {
@@ -49,6 +50,8 @@ impl Connection {
             self.session.lose(error);
             Vec::new()
         });
+        // The computer may have slept since: a command must not be typed behind its deadline.
+        let now = clock();
         let mut turn = self.session.turn(now, &received);
         if let Some(wire) = &mut self.wire {
             if turn.is_given_up {

@@ -141,7 +141,7 @@ fn run(open: Opener, orders: &Receiver<Order>, tried: impl FnOnce(Option<LinkErr
                 Err(TryRecvError::Disconnected) => return,
             }
         }
-        if !connection.turn(Moment::now()).into_iter().all(|happening| tell(what(happening))) {
+        if !connection.turn(Moment::now).into_iter().all(|happening| tell(what(happening))) {
             return;
         }
         let failure = connection.session.take_failure();

@@ -62,7 +62,12 @@ impl Wire {
         if bytes.is_empty() {
             return Ok(());
         }
-        self.port.write_all(bytes).and_then(|()| self.port.flush()).map_err(LinkError::Gone)
+        self.port.write_all(bytes).map_err(LinkError::Gone)?;
+        match self.port.flush() {
+            // The system has all bytes: a program that was stopped meanwhile has lost no port.
+            Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => Ok(()),
+            flushed => flushed.map_err(LinkError::Gone),
+        }
     }
 
     /// Discards what the port has not sent yet: the machine must not get a command after its sender has given it up.

@@ -134,7 +134,7 @@ impl Talk {
             }
         }
         to_hold.into_iter().for_each(|asked| self.ask(asked));
-        for happening in self.connection.turn(self.hub.now()) {
+        for happening in self.connection.turn(|| self.hub.now()) {
             self.take(happening);
         }
         true

@@ -74,9 +74,11 @@ pub fn write(flash: &[u8], port: &str, baud: u32) -> Result<(bool, Option<Signat
     let stop = ctrl_c()?;
     let started = command.stderr(Stdio::piped()).spawn();
     let mut avrdude = started.with_context(|| format!("avrdude cannot be started: {GET_IT}, or flash in the page"))?;
-    let (heard, alive) = mpsc::channel();
-    let words = avrdude.stderr.take();
-    let reader = thread::spawn(move || pass_on(BufReader::new(words?), io::stderr(), &heard));
+    let ((heard, alive), (bytes, words)) = (mpsc::channel(), mpsc::channel());
+    let said = avrdude.stderr.take();
+    // In a thread beside the printing one: avrdude is not silent where the terminal takes nothing.
+    thread::spawn(move || listen(BufReader::new(said?), &heard, &bytes));
+    let printer = thread::spawn(move || pass_on(words, io::stderr()));
     let (mut last_word, mut gone_at) = (Instant::now(), None);
     let succeeded = loop {
         match alive.recv_timeout(LOOK) {
@@ -107,21 +109,29 @@ pub fn write(flash: &[u8], port: &str, baud: u32) -> Result<(bool, Option<Signat
     // Also if it is there again: avrdude had the one that is gone.
     let is_gone = gone_at.is_some() || device.is_some_and(|device| !device.exists());
     ensure!(succeeded || !is_gone, "{port} is gone while the Uno was written: plug it in, and flash it again. {HALF}");
-    Ok((succeeded, reader.join().ok().flatten()))
+    Ok((succeeded, printer.join().ok().flatten()))
 }
 
 const MESSAGE: &[u8] = b"avrdude";
 
-/// Passes on avrdude's messages, each once over all tries, and its progress at once, until the input ends. Reports each
-/// byte to `heard`. Returns the signature in the messages.
-fn pass_on(from: impl BufRead, mut to: impl Write, heard: &Sender<()>) -> Option<Signature> {
+/// Reports each byte of avrdude's output, and hands it on, until it ends.
+fn listen(from: impl BufRead, heard: &Sender<()>, bytes: &Sender<u8>) -> Option<()> {
+    let is_byte = |byte: &io::Result<u8>| !matches!(byte, Err(error) if error.kind() == io::ErrorKind::Interrupted);
+    for byte in from.bytes().filter(is_byte).map_while(Result::ok) {
+        // The receivers have ended if avrdude has.
+        let _ = heard.send(());
+        bytes.send(byte).ok()?;
+    }
+    Some(())
+}
+
+/// Passes on avrdude's messages, each once over all tries, and its progress at once, until they end. Returns the
+/// signature in the messages.
+fn pass_on(from: impl IntoIterator<Item = u8>, mut to: impl Write) -> Option<Signature> {
     // The messages that were passed on, without their numbers.
     let mut said = HashSet::new();
     let (mut line, mut passed, mut signature) = (Vec::new(), 0, None);
-    let bytes = from.bytes().filter(|byte| !matches!(byte, Err(error) if error.kind() == io::ErrorKind::Interrupted));
-    for byte in bytes.map(Result::ok).chain([None]) {
-        // The receiver has ended if avrdude has.
-        let _ = heard.send(());
+    for byte in from.into_iter().map(Some).chain([None]) {
         line.extend(byte);
         let ends = matches!(byte, None | Some(b'\n' | b'\r'));
         let is_shown = match line.starts_with(MESSAGE) {
@@ -140,9 +150,6 @@ fn pass_on(from: impl BufRead, mut to: impl Write, heard: &Sender<()>) -> Option
             signature = signature.or_else(|| signature_in(&String::from_utf8_lossy(&line)));
             line.clear();
             passed = 0;
-        }
-        if byte.is_none() {
-            break;
         }
     }
     signature
@@ -181,7 +188,7 @@ mod tests {
         }
         words += "Writing | #### | 10%\rWriting | ######## | 20%\navrdude done.  Thank you.";
         let mut said = Vec::new();
-        assert_eq!(pass_on(words.as_bytes(), &mut said, &mpsc::channel().0), None);
+        assert_eq!(pass_on(words.bytes(), &mut said), None);
         let said = String::from_utf8(said).unwrap();
         assert_eq!(said.matches("not in sync").count(), 1, "{said}");
         assert!(said.starts_with("avrdude: ser_open(): no modem lines\n\navrdude: stk500_getsync() attempt 1 of 10"));

@@ -67,8 +67,9 @@ struct Talk<'a> {
     standing: Vec<Standing>,
     /// Lines that wait for an answer to the one before.
     waiting: VecDeque<Line>,
-    /// When the last command was sent, or the last line of an answer came.
-    moved_at: Instant,
+    /// Time since the last command was sent, or the last line of an answer came. At most [`LOOK`] of each turn counts:
+    /// what came while this computer stood still is read first.
+    silent: Duration,
     /// A pending `hold` to all of several rows.
     hold: Option<Hold>,
     /// The numbers of lines that could not be sent.
@@ -90,7 +91,7 @@ impl<'a> Talk<'a> {
             logs,
             standing,
             waiting: VecDeque::new(),
-            moved_at: Instant::now(),
+            silent: Duration::ZERO,
             hold: None,
             unsent: Vec::new(),
             is_split: false,
@@ -116,24 +117,28 @@ impl<'a> Talk<'a> {
             let patience = if is_opening { OPENING } else { STALLED };
             let next = if is_next {
                 self.waiting.pop_front()
-            } else if self.moved_at.elapsed() > patience {
+            } else if self.silent > patience {
                 self.take_hold()
             } else {
                 None
             };
             if let Some(line) = next {
-                self.moved_at = Instant::now();
+                self.silent = Duration::ZERO;
                 self.command(&line);
             }
             let ended = has_all && self.waiting.is_empty();
             // Three statuses after a command, all its events have come, and both answers about changed settings.
-            let is_late = self.moved_at.elapsed() > LONGEST_REPORT;
+            let is_late = self.silent > LONGEST_REPORT;
             let has_reported = |row: &Standing| row.is_there == Some(false) || row.statuses >= 3 || is_late;
             if ended && self.is_idle() && self.standing.iter().all(has_reported) {
                 return self.end();
             }
-            let Some(heard) = self.rows.next(LOOK) else { continue };
-            self.take(&heard, ended)?;
+            let began = Instant::now();
+            let heard = self.rows.next(LOOK);
+            self.silent += began.elapsed().min(LOOK);
+            if let Some(heard) = heard {
+                self.take(&heard, ended)?;
+            }
         }
     }
 
@@ -254,7 +259,7 @@ impl<'a> Talk<'a> {
             What::Happened(Happening::Event(_, line)) => said = Some(line.clone()),
             What::Happened(Happening::Answer(line)) => {
                 standing.statuses = 0;
-                self.moved_at = Instant::now();
+                self.silent = Duration::ZERO;
                 // The lines on standard output are the machine's own.
                 if let Some(head) = standing.heading.before(line) {
                     self.tell(self.chosen.under_name(row, head));

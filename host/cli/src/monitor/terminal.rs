@@ -46,6 +46,15 @@ pub fn run(rows: &Rows, names: Vec<String>, mut logs: Option<Logs>) -> Result<()
         let _ = execute!(io::stdout(), EnableMouseCapture);
     }
     let result = watch(&mut terminal, rows, Model::new(names), &mut logs, &stop);
+    // What has come while the terminal took nothing, until it was gone.
+    let ended = Instant::now();
+    while let Some(heard) = rows.next(Duration::ZERO)
+        && heard.at < ended
+        && let Some(logs) = &mut logs
+    {
+        // The check below fails for it.
+        let _ = logs.take(&heard);
+    }
     if cfg!(windows) {
         let _ = execute!(io::stdout(), DisableMouseCapture);
     }

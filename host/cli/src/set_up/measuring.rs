@@ -12,7 +12,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 /// Time limit for the servo's six swings out and in, and for waiting for plants.
-const SWINGS: Duration = Duration::from_secs(30);
+const SWINGS: Duration = Duration::from_secs(60);
 const PLANTS: Duration = Duration::from_secs(600);
 
 /// Time between two checks whether the machine stands, and the ticks after which it has left a mark.

@@ -61,7 +61,7 @@ impl Talk {
 
     /// The next turn's events, without the ends of answers.
     fn turn(&mut self) -> Vec<Happening> {
-        let mut happened = self.connection.turn(self.now);
+        let mut happened = self.connection.turn(|| self.now);
         happened.retain(|happening| !matches!(happening, Happening::Answered { .. }));
         happened
     }

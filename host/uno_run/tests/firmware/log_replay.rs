@@ -85,8 +85,8 @@ fn logged_at(port: HostPort, mut typed: Option<ChaCha8Rng>, commands: &[&str], e
                 _ => _ = connection.session.hold(),
             }
         }
-        let now = Moment::default().after(Duration::from_millis(ms.load(Ordering::Relaxed)));
-        for happening in connection.turn(now) {
+        let clock = || Moment::default().after(Duration::from_millis(ms.load(Ordering::Relaxed)));
+        for happening in connection.turn(clock) {
             assert!(!matches!(happening, Happening::Lost(_)), "{happening:?}");
             if let Happening::Status(status, _) = &happening {
                 let is_there = i64::from(status.position) > end;

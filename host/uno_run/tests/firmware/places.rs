@@ -105,7 +105,7 @@ fn recorded(
     log.lines_at(0, &lines).expect("the log can be written");
     log.lines_at(0, &recorder.found(0, "simulated")).expect("the log can be written");
     while time_s() < end_s {
-        let happened = connection.turn(Moment::default().after(Duration::from_secs_f64(time_s() - began_s)));
+        let happened = connection.turn(|| Moment::default().after(Duration::from_secs_f64(time_s() - began_s)));
         let since_s = time_s() - began_s;
         let time_ms = (since_s * 1000.0) as u64;
         for happening in happened {

@@ -31,9 +31,13 @@ fn state(host: &str, cookie: &str) -> String {
     status.split(' ').next().unwrap_or_default().to_owned()
 }
 
+fn is_late(answer: &(u16, String)) -> bool {
+    answer.0 == 412 && answer.1.contains("more than a second late, so it was not sent")
+}
+
 #[track_caller]
 fn assert_is_late(answer: &(u16, String)) {
-    assert!(answer.0 == 412 && answer.1.contains("more than a second late, so it was not sent"), "{answer:?}");
+    assert!(is_late(answer), "{answer:?}");
 }
 
 #[track_caller]
@@ -51,9 +55,17 @@ fn every_command_but_hold_states_what_its_sender_has_seen() {
         assert!(status == 428 && said.contains("as the header Weeder-Seen"), "{status} {said}");
         assert_eq!(command(seen, "hold"), (200, "ok\n".to_owned()));
     }
-    let seen = served.seen(&served.lan, &phone);
-    assert_eq!(command(&seen, "HOLD!"), (200, "ok\n".to_owned()));
-    assert_came_after_hold(&command(&seen, "start"));
+    for tries in 1.. {
+        assert!(tries < 50, "it is always late");
+        let seen = served.seen(&served.lan, &phone);
+        assert_eq!(command(&seen, "HOLD!"), (200, "ok\n".to_owned()));
+        let answer = command(&seen, "start");
+        // A busy computer may be more than a second late.
+        if !is_late(&answer) {
+            assert_came_after_hold(&answer);
+            break;
+        }
+    }
     for seen in ["0", &"9".repeat(19)] {
         assert_is_late(&command(seen, "start"));
     }
