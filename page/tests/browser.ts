@@ -162,8 +162,8 @@ async function isReady(page: Page): Promise<void> {
 async function blank(browser: Browser, { locale, ...viewport }: Screen, own: string): Promise<Opened> {
     // A context of its own can have several tabs.
     const context = await browser.newContext({ viewport, ...(locale && { locale }) });
+    context.setDefaultTimeout(PATIENCE_MS);
     const page = await context.newPage();
-    page.setDefaultTimeout(PATIENCE_MS);
     const errors: string[] = [];
     page.on("pageerror", (error) => errors.push(String(error)));
     page.on("console", (message) => {

@@ -22,8 +22,11 @@ export const part = (page: Page, machine: string, name: string): Locator =>
 export async function end(child: ChildProcess): Promise<void> {
     if (child.exitCode !== null || child.signalCode !== null) return;
     const ended = new Promise((done) => child.once("exit", done));
-    child.kill("SIGINT");
+    // Also one that is stopped, or hangs.
+    for (const signal of ["SIGCONT", "SIGINT"] as const) child.kill(signal);
+    const killing = setTimeout(() => child.kill("SIGKILL"), 20_000);
     await ended;
+    clearTimeout(killing);
 }
 
 /** Starts a virtual Uno whose port has this path, until the test ends. */

@@ -370,7 +370,7 @@ test("another language leaves the machine connected, and what was said before is
         .filter({ hasText: LANGUAGES.fr.heard.range.split("{")[2]?.slice(-8) ?? "" })
         .waitFor();
     await part(page, "state").filter({ hasText: words.hold }).waitFor();
-    assert((await page.evaluate(() => globalThis.simulation.uno.cycle)) > connected);
+    await page.waitForFunction((before) => globalThis.simulation.uno.cycle > before, connected);
     await expect(part(page, "said").getByText("connected to weeder")).toHaveCount(1);
     await expect(part(page, "said")).toHaveAttribute("lang", "en");
     // A screen reader says an error in its language, and an answer in English.

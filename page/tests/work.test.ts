@@ -5,7 +5,7 @@ import { execFileSync } from "node:child_process";
 import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import test, { after, before, type TestContext } from "node:test";
 import type { Browser, Page } from "playwright";
-import { close, DESK, expect, inspect, launch, moving, PHONE } from "./browser.ts";
+import { close, DESK, expect, inspect, launch, moving, PATIENCE_MS, PHONE } from "./browser.ts";
 import * as panel from "./panel.ts";
 import { FIRMWARE, part, type } from "./panel.ts";
 import { type Device, Foreign, VirtualUno } from "./ports.ts";
@@ -73,7 +73,7 @@ test("the log of a row at work is replayed by weeder without a difference", asyn
     await part(page, "log-save").click();
     await (await download).saveAs("build/files/log.csv");
     const replayed = execFileSync(WEEDER, ["replay", "build/files/log.csv"], { encoding: "utf8" });
-    assert.match(replayed, /^The same: [3-9]\d* detections, 0 alarms and [1-9]\d* swings/);
+    assert.match(replayed, /^The same: ([3-9]|[1-9]\d+) detections, 0 alarms and [1-9]\d* swings/);
     await close({ page, errors });
 });
 
@@ -265,7 +265,10 @@ test("the servo is calibrated by eye, and timed, while the machine stands", asyn
     await part(page, "servo-in-is").click();
     await part(page, "servo-said").filter({ hasText: "1510 us is the tool in the row now" }).waitFor();
     await part(page, "servo-time").click();
-    await part(page, "servo-said").filter({ hasText: "Enter the longest swing out" }).waitFor({ timeout: 60_000 });
+    // Six swings take 20 s of the chip's time.
+    await part(page, "servo-said")
+        .filter({ hasText: "Enter the longest swing out" })
+        .waitFor({ timeout: 5 * PATIENCE_MS });
     await part(page, "lead_out_ms").fill("150");
     await part(page, "servo-leads").click();
     await part(page, "servo-said").filter({ hasText: "Both leads are set" }).waitFor();
@@ -308,13 +311,10 @@ test("the servo is calibrated by eye, and timed, while the machine stands", asyn
 test("an object is taught by a button, and one that the built-in examples know better is insisted on", async (test) => {
     const { page, errors, uno } = await atHold(test, PHONE, "--weeds", "0", "--plants", "2", "--roll");
     uno.type("");
-    await part(page, "speed")
-        .filter({ hasText: /^[1-9]/ })
-        .waitFor();
-    await part(page, "speed").filter({ hasText: /^0\.0/ }).waitFor();
     await page.getByRole("tab", { name: "Taught" }).click();
     await part(page, "examples-count").filter({ hasText: "0 of 32" }).waitFor();
     await part(page, "last-object").filter({ hasText: "Last: plant" }).waitFor();
+    await part(page, "speed").filter({ hasText: /^0\.0/ }).waitFor();
     await part(page, "teach-weed").click();
     await part(page, "teach-said").filter({ hasText: "the built-in examples say plant, look again" }).waitFor();
     await inspect(page, "phone-teach");

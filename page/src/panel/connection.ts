@@ -1,7 +1,7 @@
 // The real Uno at the browser's serial port: buttons connect and disconnect it. After its cable was unplugged and
 // plugged in again, it is connected automatically.
 
-import { wait } from "../clock.ts";
+import { every, wait } from "../clock.ts";
 import { type Parts, plain } from "../dom.ts";
 import { choosePort, PortError, SerialLine, sessionOver, whyNoSerial } from "../link/serial.ts";
 import { english, say, told } from "../words/words.ts";
@@ -61,7 +61,7 @@ export class Connection {
         };
         // A hidden page has lost it.
         document.addEventListener("visibilitychange", () => void this.#stayLit());
-        setInterval(() => panel.turn(performance.now()), TURN_MS);
+        every(TURN_MS, () => panel.turn(performance.now()));
         this.#show();
     }
 

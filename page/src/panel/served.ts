@@ -1,6 +1,7 @@
 // The machines at the ports of `weeder serve`, side by side: a panel with its name for each. If there are several, an
 // overview is above them: the state of each, and one HOLD for all, with the time until the last one has obeyed.
 
+import { every } from "../clock.ts";
 import { make, makeButton } from "../dom.ts";
 import { type HeldAll, Served } from "../link/served.ts";
 import { ended, inLanguage, quantity, say, show, told } from "../words/words.ts";
@@ -44,11 +45,11 @@ export async function showServed(into: HTMLElement): Promise<Panel[]> {
         panels.push(panel);
     }
     served.mayReload = () => !panels.some(({ isNeeded }) => isNeeded);
-    setInterval(() => {
+    every(TURN_MS, () => {
         served.watch();
         for (const panel of panels) panel.turn(performance.now());
         showAll?.(panels);
-    }, TURN_MS);
+    });
     const tabs = new BroadcastChannel("served");
     tabs.onmessage = () => {
         served.isBehind = document.hidden;
