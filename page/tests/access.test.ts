@@ -4,7 +4,7 @@
 import assert from "node:assert/strict";
 import test, { after, before } from "node:test";
 import type { Browser, Page } from "playwright";
-import { close, launch, open } from "./browser.ts";
+import { close, launch, open, PATIENCE_MS } from "./browser.ts";
 import { VirtualUno } from "./ports.ts";
 import { part, pass, rollTo, tryIt } from "./trying.ts";
 
@@ -137,7 +137,7 @@ test("an Uno is flashed, connected, set, started and held by Tab, Enter, Space a
     const { page } = opened;
     const inWork = (name: string) => page.locator(`#view-work [data-part="${name}"]`);
     await press(page, "Flash it", "Enter");
-    await page.locator("[data-part=flash-said]", { hasText: "Done" }).waitFor();
+    await page.locator("[data-part=flash-said]", { hasText: "Done" }).waitFor({ timeout: 5 * PATIENCE_MS });
     assert.equal(await focused(page), "Flash it");
     await press(page, "Work with it", "Space");
     await inWork("alarm-name").filter({ hasText: "settings_lost" }).waitFor();

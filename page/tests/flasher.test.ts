@@ -10,7 +10,7 @@ import { BOARDS, type Board, Bootloader } from "../src/flasher/stk500.ts";
 import type { SerialLine } from "../src/link/serial.ts";
 import { FLASH_BYTES } from "../src/uno/chip.ts";
 import { readHex, usedBytes } from "../src/uno/hex.ts";
-import { close, expect, inspect, launch, open, PHONE, served } from "./browser.ts";
+import { close, expect, inspect, launch, open, PATIENCE_MS, PHONE, served } from "./browser.ts";
 import { type Device, Foreign, offerPorts, VirtualUno } from "./ports.ts";
 
 const FIRMWARE = resolve("../target/avr-none/firmware/weeder-firmware.elf");
@@ -29,8 +29,17 @@ after(() => browser?.close());
 async function flash(page: Page): Promise<string> {
     const button = page.getByRole("button", { name: "Flash it" });
     await button.click();
-    await page.locator("[data-part=flash-said]:not(:empty)").waitFor();
+    await page.locator("[data-part=flash-said]:not(:empty)").waitFor({ timeout: 5 * PATIENCE_MS });
     return (await page.locator("[data-part=flash-said]").textContent()) ?? "";
+}
+
+/** Flashes until it is done: a busy computer may be too late for the bootloader. Returns the message. */
+async function flashed(page: Page): Promise<string> {
+    for (let tries = 1; ; tries++) {
+        const said = await flash(page);
+        if (said.startsWith("Done: ")) return said;
+        assert(tries < 5 && said.includes("bootloader"), said);
+    }
 }
 
 /** The message after flashing this device. */
@@ -47,7 +56,7 @@ test("an Uno with an empty flash is flashed through its bootloader, and is worke
     const uno = await VirtualUno.start(test, ...OPTIBOOT);
     const opened = await open(browser, "flash", PHONE, [uno]);
     const { page } = opened;
-    const flashing = flash(page);
+    const flashing = flashed(page);
     await page.locator("[data-part=phase]", { hasText: /Writing: [1-9]\d*%/ }).waitFor();
     await inspect(page, "phone-flashing");
     const done = await flashing;
@@ -75,12 +84,12 @@ test("an old bootloader is flashed at its own rate and its fault is told, or tha
     await fault.waitFor();
     await inspect(opened.page, "desk-old-board");
     const fits = usedBytes(readHex(hex, FLASH_BYTES)) <= board.roomBytes;
-    assert.match(
-        await flash(opened.page),
-        fits
-            ? /^Done: /
-            : /^Not flashed: the firmware takes \d+ bytes, and this board's bootloader leaves 30720: give it the Uno's bootloader/,
-    );
+    if (fits) await flashed(opened.page);
+    else
+        assert.match(
+            await flash(opened.page),
+            /^Not flashed: the firmware takes \d+ bytes, and this board's bootloader leaves 30720: give it the Uno's bootloader/,
+        );
     await close(opened);
 });
 
@@ -90,8 +99,7 @@ test("a cable that is pulled while it is flashed is told, and the same board is 
     uno.pullAfterBytes = 5000;
     assert.match(await flash(opened.page), /^Not flashed: the port is gone: .*plug it in again, and flash it again/);
     uno.plugIn();
-    await opened.page.getByRole("button", { name: "Flash it" }).click();
-    await opened.page.locator("[data-part=flash-said]", { hasText: "Done" }).waitFor();
+    await flashed(opened.page);
     await close(opened);
 });
 
@@ -138,7 +146,7 @@ test("a byte that is lost on the way is sent again", async (test) => {
     const uno = await VirtualUno.start(test, ...OPTIBOOT);
     const opened = await open(browser, "flash", undefined, [uno]);
     uno.loseBytes = [3000, 9000];
-    assert.match(await flash(opened.page), /^Done: /);
+    await flashed(opened.page);
     assert.deepEqual(uno.loseBytes, []);
     await close(opened);
 });
@@ -159,7 +167,7 @@ test("an Uno is flashed in a hidden tab too, through the bootloader's second", a
     const uno = await VirtualUno.start(test, ...OPTIBOOT);
     const opened = await open(browser, "flash", undefined, [uno]);
     await hide(opened.page);
-    assert.match(await flash(opened.page), /^Done: /);
+    await flashed(opened.page);
     await close(opened);
 });
 

@@ -7,7 +7,19 @@ import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
 import test, { after, before, type TestContext } from "node:test";
 import type { Browser } from "playwright";
-import { close, expect, inspect, launch, type Opened, open, openAt, PHONE, reload, served } from "./browser.ts";
+import {
+    close,
+    expect,
+    inspect,
+    launch,
+    type Opened,
+    open,
+    openAt,
+    PATIENCE_MS,
+    PHONE,
+    reload,
+    served,
+} from "./browser.ts";
 import { type Device, VirtualUno } from "./ports.ts";
 
 const FIRMWARE = resolve("../target/avr-none/firmware/weeder-firmware.elf");
@@ -218,7 +230,7 @@ test("an Uno with another firmware is told with what changes, and gets its setti
     await (await download).saveAs("build/files/before.toml");
     assert.match(readFileSync("build/files/before.toml", "utf8"), /\nno_crop_m = \d+\n/);
     await page.getByRole("button", { name: "Flash it" }).click();
-    await page.getByRole("button", { name: "Work with it" }).click();
+    await page.getByRole("button", { name: "Work with it" }).click({ timeout: 5 * PATIENCE_MS });
     await part("alarm-name").filter({ hasText: "settings_lost" }).waitFor();
     await expect(part("update")).toBeHidden();
     await part("restore-go").click();
