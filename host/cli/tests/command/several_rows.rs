@@ -166,12 +166,12 @@ fn the_plain_monitor_types_to_one_row_or_all_and_prints_each_answer() {
     let [left, right] = [0, 1].map(|number| port(&folder, number).display().to_string());
     let ports = ["--port", &format!("left={left}"), "--port", &format!("right={right}")].map(str::to_owned);
     let words: Vec<&str> = ["monitor", "--plain"].into_iter().chain(ports.iter().map(String::as_str)).collect();
-    let said = printed(&weeder(&words, "save\nclear\nLeft: start\nALL: version\n"), 0);
-    assert!(said.contains("left: ok\n") && said.contains("right: weeder "), "{said}");
-    assert!(said.contains("left: state is=work\n") && !said.contains("right: state is=work"), "{said}");
     // By itself: behind lines whose answers a busy computer delays, it goes first.
     let held = printed(&weeder(&words, "hold\n"), 0);
     assert!(held.contains("HOLD 2 of 2 in ") && held.contains(" last\n"), "{held}");
+    let said = printed(&weeder(&words, "Left: set k 5\nALL: get k\nversion\n"), 0);
+    assert!(said.contains("left: ok\n") && said.contains("right: weeder "), "{said}");
+    assert!(said.contains("left: k=5 ") && said.contains("right: k=3 "), "{said}");
     let refused = printed(&weeder(&words, "right: launch\n"), 1);
     assert!(refused.contains("right: error:") && !refused.contains("left: error:"), "{refused}");
     let unknown = printed(&weeder(&words, "hedge: hold\n"), 2);
