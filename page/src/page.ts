@@ -92,9 +92,10 @@ tryPanel.onHappening = (happening) => {
         .then(start, () => {})
         .finally(drive);
 };
-/** Types one command after the other: one that waits too long for those before it is not sent. */
+/** Types one command after the other: one that waits too long for those before it is not sent. A HOLD ends it. */
 async function setUp(): Promise<void> {
-    for (const command of [...simulation.machine.setUp, "save", "clear"]) await tryPanel.ask(command);
+    for (const command of simulation.machine.setUp) await tryPanel.ask(command);
+    await Promise.all(["save", "clear"].map((command) => tryPanel.ask(command)));
 }
 /** Whether the machine is set up. Until then it stands: it would pass plants with other settings than are shown. */
 let isSettled = false;

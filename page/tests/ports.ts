@@ -121,6 +121,11 @@ export class VirtualUno implements Device {
         this.pullAfterBytes = Number.POSITIVE_INFINITY;
     }
 
+    /** Loses these of the bytes on their way to it, counted from the next one. */
+    lose(...places: number[]): void {
+        this.loseBytes = places.map((place) => this.#written + place);
+    }
+
     async #stop(): Promise<void> {
         this.close();
         if (this.#process.exitCode === null) {

@@ -11,7 +11,7 @@ use link::rows::{Heard, Rows, What};
 use link::session::Happening;
 use link::settings::other_version;
 use logbook::log::{Kind, LogError, LogWriter};
-use std::io::{self, IsTerminal, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -41,10 +41,10 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments) -> Result<()> {
     // A terminal that takes nothing delays no line of a log.
-    printing_aside(&mut io::sink(), |lines| record(arguments, &|line| drop(lines.send(Printed::Message(line)))))
+    printing_aside(&mut io::sink(), |lines| record(arguments, &|line| drop(lines.send(line))))
 }
 
-fn record(arguments: &Arguments, tell: &dyn Fn(String)) -> Result<()> {
+fn record(arguments: &Arguments, tell: &dyn Fn(Printed)) -> Result<()> {
     let chosen = arguments.ports.choose(arguments.gps.port())?;
     let gps = arguments.gps.open(&chosen)?;
     let mut logs = Logs::open(&arguments.out, &chosen)?;
@@ -55,8 +55,11 @@ fn record(arguments: &Arguments, tell: &dyn Fn(String)) -> Result<()> {
     let mut gps = gps.map(|(receiver, _)| receiver);
     let (rows, _) = open(&chosen)?;
     let stop = ctrl_c()?;
-    tell(format!("Recording into {}, Ctrl-C ends it", arguments.out.display()));
-    while !stop.load(Ordering::Relaxed) {
+    tell(Printed::Message(format!("Recording into {}, Ctrl-C ends it", arguments.out.display())));
+    let mut is_over = false;
+    while !is_over {
+        // What has come until then is written.
+        is_over = stop.load(Ordering::Relaxed);
         if let Some(gps) = &mut gps {
             let time_ms = logs.time_ms(gps.row, Instant::now());
             let said = gps.turn(time_ms, Instant::now());
@@ -64,53 +67,44 @@ fn record(arguments: &Arguments, tell: &dyn Fn(String)) -> Result<()> {
             logs.go_on_after(written, gps.row, &chosen, tell)?;
             for (kind, line) in &said {
                 if let Kind::GpsFound | Kind::GpsLost | Kind::GpsMark = kind {
-                    tell(format!("Receiver: {line}"));
+                    tell(Printed::Message(format!("Receiver: {line}")));
                 }
             }
         }
         // All that waits: a read of the receiver may take 16 ms on Windows, and a busy disk seconds, in which many events come.
         // The receiver's next line is later than these.
-        let (began, mut patience) = (Instant::now(), LOOK);
+        let mut patience = LOOK;
         while let Some(heard) = rows.next(patience) {
-            let is_new = heard.at > began;
             patience = Duration::ZERO;
             let written = logs.take(&heard);
             logs.go_on_after(written, heard.row, &chosen, tell)?;
-            if let What::Happened(happening) = heard.what {
-                if let Some(gps) = gps.as_mut().filter(|gps| gps.row == heard.row) {
-                    gps.happened(logs.time_ms(heard.row, heard.at), &happening);
-                }
-                tell_of(&chosen, heard.row, happening, tell);
+            let What::Happened(happening) = heard.what else { continue };
+            if let Some(gps) = gps.as_mut().filter(|gps| gps.row == heard.row) {
+                gps.happened(logs.time_ms(heard.row, heard.at), &happening);
             }
-            if is_new {
-                break;
-            }
+            tell_of(&chosen, heard.row, happening, tell);
         }
     }
     if let Some(gps) = &gps {
-        tell(gps.summary().to_string());
+        tell(Printed::Message(gps.summary().to_string()));
     }
     logs.end(tell)
 }
 
-fn tell_of(chosen: &Chosen, row: usize, happening: Happening, tell: &dyn Fn(String)) {
-    let tell = |what: &str| tell(chosen.under_name(row, what));
+fn tell_of(chosen: &Chosen, row: usize, happening: Happening, tell: &dyn Fn(Printed)) {
+    let say = |what: &str| tell(Printed::Message(chosen.under_name(row, what)));
     match happening {
         Happening::Connected { version, shown, .. } => {
-            tell(&format!("weeder {version} is there"));
+            say(&format!("weeder {version} is there"));
             if let Some(other) = other_version(&version, &shown) {
-                tell(&other);
+                say(&other);
             }
         }
         Happening::Started { while_at_work: Some(cause), .. } => {
-            let mut errors = io::stderr();
-            if errors.is_terminal() {
-                // As for `Messages`: a bell that fails ends no record.
-                let _ = errors.write_all(b"\x07");
-            }
-            tell(&advice::restarted(&cause));
+            tell(Printed::Bell);
+            say(&advice::restarted(&cause));
         }
-        Happening::Lost(why) => tell(&why),
+        Happening::Lost(why) => say(&why),
         _ => {}
     }
 }
@@ -185,23 +179,26 @@ impl Logs {
         written: Result<(), LogError>,
         row: usize,
         chosen: &Chosen,
-        tell: &dyn Fn(String),
+        tell: &dyn Fn(Printed),
     ) -> Result<()> {
         if let Err(error) = written {
-            tell(format!("error: {}", chosen.under_name(row, &format!("{:#}", anyhow::Error::from(error)))));
+            tell(Printed::Message(format!(
+                "error: {}",
+                chosen.under_name(row, &format!("{:#}", anyhow::Error::from(error)))
+            )));
             ensure!(self.0.iter().any(|log| log.is_written), "no log can be written any more");
         }
         Ok(())
     }
 
     /// Says what is in them, and fails if one could not be written.
-    fn end(&self, tell: &dyn Fn(String)) -> Result<()> {
+    fn end(&self, tell: &dyn Fn(Printed)) -> Result<()> {
         for Log { path, writer, .. } in &self.0 {
             let now = match writer.check() {
                 Ok(()) => format!("{} has {} now", path.display(), writer.lines()),
                 Err(why) => why.to_string(),
             };
-            tell(format!("{} lines were added: {now}", writer.added));
+            tell(Printed::Message(format!("{} lines were added: {now}", writer.added)));
         }
         self.check()?;
         Ok(self.0.iter().try_for_each(|log| log.writer.check())?)

@@ -13,7 +13,7 @@ use anyhow::{Context, Result, ensure};
 use files::in_a_line;
 use std::env;
 use std::fmt::Arguments;
-use std::io::{self, ErrorKind, Write};
+use std::io::{self, ErrorKind, IsTerminal, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{self, Receiver, Sender};
@@ -91,6 +91,8 @@ pub enum Printed {
     Result(String),
     /// A message, as by [`Messages`].
     Message(String),
+    /// The bell of the operator's terminal.
+    Bell,
 }
 
 /// Does work whose lines are printed in a thread of its own: the work never waits for the output. All lines are
@@ -119,6 +121,13 @@ fn print_all(waiting: Receiver<Printed>, output: &mut impl Write) -> bool {
     for line in waiting {
         match line {
             Printed::Message(line) => writeln!(Messages, "{line}"),
+            Printed::Bell => {
+                let mut errors = io::stderr();
+                if errors.is_terminal() {
+                    // As for a message.
+                    let _ = errors.write_all(b"\x07");
+                }
+            }
             Printed::Result(line) if is_printed => {
                 if let Err(error) = print_to(output, format_args!("{line}\n")) {
                     writeln!(Messages, "error: {error:#}");

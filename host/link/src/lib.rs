@@ -49,7 +49,7 @@ use self::moment::Moment;
 use self::session::Session;
 use control::say::command::{Command, ParseError, parse};
 use std::collections::VecDeque;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Characters that the firmware takes in a line.
 pub const COMMAND_LENGTH: usize = control::say::command::LINE_LENGTH;
@@ -138,15 +138,16 @@ impl Link {
 
     /// Waits for the answer to a command that was typed.
     fn answer(&mut self, command: &str) -> Result<Vec<String>, LinkError> {
-        // By the reads: a computer that stood still finds the answer there.
+        // A computer that stood still finds the answer there: of each read only its usual time counts.
         let mut waited = Duration::ZERO;
         let (mut silent_reads, mut bytes) = (0, 0);
         let mut answer: Vec<String> = Vec::new();
         while silent_reads < SILENT_READS && bytes < session::ANSWER_BYTES && waited < session::ANSWER_TIME {
             let Some(line) = self.lines.next_line() else {
+                let began = Instant::now();
                 let received = self.receive()?;
+                waited += began.elapsed().min(SILENT_READ);
                 silent_reads = if received == 0 { silent_reads + 1 } else { 0 };
-                waited += if received == 0 { SILENT_READ } else { BUSY_READ };
                 bytes += received;
                 continue;
             };

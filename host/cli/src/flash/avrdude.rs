@@ -75,9 +75,9 @@ pub fn write(flash: &[u8], port: &str, baud: u32) -> Result<(bool, Option<Signat
     let started = command.stderr(Stdio::piped()).spawn();
     let mut avrdude = started.with_context(|| format!("avrdude cannot be started: {GET_IT}, or flash in the page"))?;
     let ((heard, alive), (bytes, words)) = (mpsc::channel(), mpsc::channel());
-    let said = avrdude.stderr.take();
+    let said = BufReader::new(avrdude.stderr.take().context("avrdude has no messages")?);
     // In a thread beside the printing one: avrdude is not silent where the terminal takes nothing.
-    thread::spawn(move || listen(BufReader::new(said?), &heard, &bytes));
+    thread::spawn(move || listen(said, &heard, &bytes));
     let printer = thread::spawn(move || pass_on(words, io::stderr()));
     let (mut last_word, mut gone_at) = (Instant::now(), None);
     let succeeded = loop {
@@ -115,14 +115,15 @@ pub fn write(flash: &[u8], port: &str, baud: u32) -> Result<(bool, Option<Signat
 const MESSAGE: &[u8] = b"avrdude";
 
 /// Reports each byte of avrdude's output, and hands it on, until it ends.
-fn listen(from: impl BufRead, heard: &Sender<()>, bytes: &Sender<u8>) -> Option<()> {
+fn listen(from: impl BufRead, heard: &Sender<()>, bytes: &Sender<u8>) {
     let is_byte = |byte: &io::Result<u8>| !matches!(byte, Err(error) if error.kind() == io::ErrorKind::Interrupted);
     for byte in from.bytes().filter(is_byte).map_while(Result::ok) {
-        // The receivers have ended if avrdude has.
+        // Who waits for it may have ended with avrdude.
         let _ = heard.send(());
-        bytes.send(byte).ok()?;
+        if bytes.send(byte).is_err() {
+            break;
+        }
     }
-    Some(())
 }
 
 /// Passes on avrdude's messages, each once over all tries, and its progress at once, until they end. Returns the

@@ -30,6 +30,9 @@ const READ_AHEAD: usize = 64;
 
 const LOOK: Duration = Duration::from_millis(20);
 
+/// Longest look that counts as a wait for an answer: in a longer one this computer stood still.
+const LONGEST_LOOK: Duration = Duration::from_millis(200);
+
 /// Time without a line of an awaited answer after which a `hold` goes first.
 const STALLED: Duration = Duration::from_millis(500);
 
@@ -67,8 +70,8 @@ struct Talk<'a> {
     standing: Vec<Standing>,
     /// Lines that wait for an answer to the one before.
     waiting: VecDeque<Line>,
-    /// Time since the last command was sent, or the last line of an answer came. At most [`LOOK`] of each turn counts:
-    /// what came while this computer stood still is read first.
+    /// Time in looks since the last command was sent, or the last line of an answer came. What came while this computer
+    /// stood still is read first.
     silent: Duration,
     /// A pending `hold` to all of several rows.
     hold: Option<Hold>,
@@ -135,7 +138,7 @@ impl<'a> Talk<'a> {
             }
             let began = Instant::now();
             let heard = self.rows.next(LOOK);
-            self.silent += began.elapsed().min(LOOK);
+            self.silent += began.elapsed().min(LONGEST_LOOK);
             if let Some(heard) = heard {
                 self.take(&heard, ended)?;
             }

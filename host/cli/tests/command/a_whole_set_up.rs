@@ -41,7 +41,7 @@ fn a_person_sets_the_virtual_uno_up_from_the_first_question_to_the_last() {
             type_to(keyboard, "");
             if timings == 1 {
                 // The swings have begun by then, and have not ended.
-                thread::sleep(Duration::from_secs(4));
+                thread::sleep(Duration::from_secs(8));
                 type_to(&mut machine, "1000");
                 disturbed = true;
             }
@@ -56,8 +56,8 @@ fn a_person_sets_the_virtual_uno_up_from_the_first_question_to_the_last() {
     });
     assert!(first.ends_with("Stopped. The same command continues here.\n"), "{first}");
     let second = lead(folder.path(), &words, &mut act);
-    // On a busy computer the machine may roll before the swings, or they take too long once.
-    assert!(disturbed && (2..=4).contains(&timings), "{timings} timings: {second}");
+    // A busy computer may take too long for the swings once.
+    assert!(disturbed && (3..=4).contains(&timings), "{timings} timings: {second}");
     let parts = [
         "Step 4 of 8, Fit a second beam: done",
         "servo_out_us in us, now 2000 [1750]",

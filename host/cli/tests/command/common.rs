@@ -1,6 +1,8 @@
 //! Runs `weeder` as a user does, and returns its output.
 
 use std::io::{BufRead, BufReader, Write};
+#[cfg(target_os = "linux")]
+use std::io::{PipeReader, PipeWriter};
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use tempfile::TempDir;
@@ -66,6 +68,18 @@ pub fn typed(weeder: &mut Command, input: impl AsRef<[u8]>) -> Output {
     // A command that fails at once reads no input.
     let _ = weeder.stdin.take().expect("it is piped").write_all(input.as_ref());
     weeder.wait_with_output().expect("it ends")
+}
+
+/// A pipe that no program reads, as full as a stopped terminal: its two ends.
+#[cfg(target_os = "linux")]
+pub fn full_pipe() -> (PipeReader, PipeWriter) {
+    let (unread, full) = std::io::pipe().expect("there are pipes");
+    let fill = ["if=/dev/zero", "of=/dev/stdout", "bs=4096", "oflag=nonblock"];
+    let filled =
+        Command::new("dd").args(fill).env("LC_ALL", "C").stdout(full.try_clone().expect("it is open")).output();
+    let said = String::from_utf8_lossy(&filled.expect("there is dd").stderr).into_owned();
+    assert!(said.contains("temporarily unavailable"), "it is not full: {said}");
+    (unread, full)
 }
 
 /// All output, if it ended with this status.

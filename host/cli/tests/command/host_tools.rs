@@ -1,5 +1,7 @@
 //! The host tools at a pseudo terminal, as a user runs them, with the virtual Uno at its other end.
 
+#[cfg(target_os = "linux")]
+use crate::common::full_pipe;
 use crate::common::{self, Running, assert_has, command, folder_with, printed, typed};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -373,6 +375,26 @@ fn a_terminated_virtual_uno_removes_its_link() {
         assert!(uno.0.wait().expect("it ends").success(), "{signal}");
         assert!(!link.is_symlink(), "{signal} has left it behind");
     }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_recording_goes_on_where_its_terminal_takes_nothing() {
+    let uno = uno();
+    let folder = tempfile::tempdir().expect("there is room for a file");
+    let log = folder.path().join("log.csv");
+    let (unread, full) = full_pipe();
+    let mut record = command(&["record", "--out"]);
+    let recording = Running::start(record.arg(&log).arg("--port").arg(uno.path()).stderr(full));
+    for _ in 0..1200 {
+        if lines_of(&log, "status") >= 20 {
+            break;
+        }
+        thread::sleep(Duration::from_millis(50));
+    }
+    assert!(lines_of(&log, "status") >= 20, "{:?}", fs::read_to_string(&log));
+    drop(unread);
+    recording.interrupt();
 }
 
 #[cfg(unix)]

@@ -4,7 +4,7 @@
 //! 127.0.0.2 stands for the computer's address in the network: every request to it counts as a request from the
 //! network. The tests wait for results, not for fixed times.
 
-use crate::common::{Running, assert_fails, command};
+use crate::common::{Running, assert_fails, command, full_pipe};
 use serde_json::Value;
 use socket2::{Domain, Socket, Type};
 use std::fs;
@@ -297,13 +297,7 @@ fn a_pulled_port_is_opened_again_while_the_other_machine_works() {
 fn an_output_that_takes_nothing_delays_neither_hold_nor_the_end() {
     let folder = folder();
     let (_uno, port) = uno(&folder, "uno", &["--stand"]);
-    // As full as a stopped terminal: a pipe that no program reads.
-    let (_unread, full) = std::io::pipe().expect("there are pipes");
-    let fill = ["if=/dev/zero", "of=/dev/stdout", "bs=4096", "oflag=nonblock"];
-    let filled =
-        Command::new("dd").args(fill).env("LC_ALL", "C").stdout(full.try_clone().expect("it is open")).output();
-    let said = String::from_utf8_lossy(&filled.expect("there is dd").stderr).into_owned();
-    assert!(said.contains("temporarily unavailable"), "it is not full: {said}");
+    let (_unread, full) = full_pipe();
     let served = serve_telling(full.into(), command(&["serve"]), &folder, &[&port], &LAN);
     // The machine's thread has told that it is there.
     served.make_ready(0);

@@ -52,7 +52,7 @@ impl Session {
         self.turn.to_send.extend([ERASE; HOLD.len()]);
         self.turn.to_send.extend(format!("{HOLD}\n").bytes());
         self.held = Typed { at: self.waited, again: self.held.again + 1 };
-        self.poll_at = Duration::ZERO;
+        (self.poll_at, self.is_polled) = (Duration::ZERO, false);
     }
 
     /// Whether this end of an answer leaves the present question open: the refusal of a `hold`, which is typed again, or the
@@ -79,8 +79,8 @@ mod tests {
     use crate::moment::Moment;
     use crate::session::{Happening, VERSION};
 
-    /// What a session with a machine has typed and said in 2 s. `hold` is typed after 1 s; the machine's answers to `hold` are
-    /// these, then "ok". An empty one is lost.
+    /// What a session with a machine has typed and said in 2 s. `hold` is typed after 1 s, and `start now` waits behind it. The
+    /// machine's answers to `hold` are these, then "ok". An empty one is lost.
     fn held(answers: &[&str]) -> (Vec<String>, Vec<Happening>) {
         let (mut session, mut now, mut received) = (Session::default(), Moment::default(), String::new());
         let (mut answers, mut typed, mut happened) = (answers.iter(), Vec::new(), Vec::new());
@@ -89,6 +89,9 @@ mod tests {
             if turn == 50 {
                 assert!(session.is_connected());
                 session.hold();
+            }
+            if turn == 52 {
+                assert!(session.command("start now", Moment::NEVER).is_some());
             }
             now = now.after(Duration::from_millis(20));
             let turn = session.turn(now, received.as_bytes());
@@ -103,7 +106,7 @@ mod tests {
                     STATUS => {
                         "state=hold tool=out pos=0 speed_mm_s=0 windows=0 unseen_mm=400\r\nlost=0 jumps=0\r\nok\r\n"
                     }
-                    "examples" | "events on" => "ok\r\n",
+                    "examples" | "events on" | "start now" => "ok\r\n",
                     _ => "",
                 };
                 typed.push(line.to_owned());
@@ -127,7 +130,10 @@ mod tests {
             let (typed, happened) = held(answers);
             assert_eq!(typed.iter().filter(|line| *line == HOLD).count(), times, "{answers:?}");
             let ends: Vec<_> = happened.iter().filter(|one| matches!(one, Happening::Answered { .. })).collect();
-            assert!(matches!(ends[..], [Happening::Answered { refusal: None, .. }]), "{answers:?}: {ends:?}");
+            assert!(matches!(ends[..], [Happening::Answered { refusal: None, .. }, _]), "{answers:?}: {ends:?}");
+            let at = |line: &str| typed.iter().rposition(|typed| typed == line).unwrap();
+            let is_asked = typed[at(HOLD)..at("start now")].iter().any(|line| line == STATUS);
+            assert!(is_asked || times == 1, "{answers:?}: {typed:?}");
             assert!(
                 !happened.iter().any(|one| matches!(one, Happening::Lost(_) | Happening::Unanswered { .. })),
                 "{answers:?}"

@@ -30,7 +30,7 @@ impl Session {
         } else if matches!(self.state, State::Asking(_) | State::Ready)
             && let Some(number) = self.to_hold.take()
         {
-            self.held.at = self.waited;
+            (self.held.at, self.is_polled) = (self.waited, false);
             return self.send(HOLD.to_owned(), Some(number));
         }
         if !self.asked.is_empty() {

@@ -1,9 +1,9 @@
-//! Sessions whose turns are far apart, as of a page in the background or on a slow computer.
+//! Sessions on a slow computer: their turns are far apart.
 
 use super::*;
 
 #[test]
-fn whatever_the_time_between_turns_all_that_waits_is_typed_beside_the_status() {
+fn in_turns_of_any_length_all_that_waits_is_typed_beside_the_status() {
     for turn_ms in [1, 20, 99, 100, 150, 400, 1000, 2500] {
         let mut talk = Talk::connected();
         let turn = |talk: &mut Talk| {
