@@ -109,6 +109,11 @@ export class VirtualUno implements Device {
         this.#fd = undefined;
     }
 
+    /** Has it stand still, or go on. */
+    pause(isPaused: boolean): void {
+        this.#process.kill(isPaused ? "SIGSTOP" : "SIGCONT");
+    }
+
     /** Pulls its cable. */
     pull(): void {
         this.#isPulled = true;
@@ -130,6 +135,7 @@ export class VirtualUno implements Device {
         this.close();
         if (this.#process.exitCode === null) {
             const ended = new Promise((done) => this.#process.once("exit", done));
+            this.pause(false);
             this.#process.kill();
             await ended;
         }
@@ -232,10 +238,18 @@ function putPorts(count: number): void {
             if (refuses) throw new DOMException(refuses.message, refuses.name);
             this.#isOpen = true;
             this.#listen();
+            this.#write();
+        }
+
+        #write() {
             this.writable = new WritableStream({
                 write: async (bytes) => {
                     if (!this.#isOpen) throw new DOMException("The device has been lost.", "NetworkError");
                     await bridge.deviceWrite(this.#index, [...bytes]);
+                },
+                // It has another stream then.
+                abort: () => {
+                    if (this.#isOpen) this.#write();
                 },
             });
         }

@@ -41,6 +41,9 @@ class Connected {
             send: (text) => {
                 if (text.endsWith("\b\n") || !lost(lines++)) this.#onItsWay.push(text);
             },
+            discard: () => {
+                this.#onItsWay.length = 0;
+            },
             close: async () => {},
         };
         this.session = new Session(wire, this.nowMs, false, () => this.nowMs + this.calendarMs);
@@ -150,6 +153,21 @@ test("a question that noise takes, whichever it is, loses no machine for good", 
             `question ${taken} ends the session`,
         );
     }
+});
+
+test("a command that a stalled line has kept until it was given up does not reach the machine", async () => {
+    const machine = new Connected();
+    while (!machine.has("connected")) await machine.turn();
+    machine.session.hold().catch(() => {});
+    for (let turn = 0; turn < 50; turn++) await machine.turn();
+    assert.equal(machine.mode, "hold");
+    machine.stalledUntil = machine.nowMs + 60_000;
+    const asked = machine.session.ask("start now").catch((error: Error) => error.message);
+    for (let turn = 0; turn < 2 * TURNS; turn++) await machine.turn();
+    assert.match(String(await asked), /may have done this/);
+    machine.stalledUntil = 0;
+    for (let turn = 0; turn < TURNS; turn++) await machine.turn();
+    assert(!machine.works);
 });
 
 test("a line is told when it comes, and not in the next turn: its moment says where the machine is", async () => {
@@ -289,7 +307,7 @@ async function pressInAnyOrder(seed: number): Promise<string[]> {
 
 test("in any order nothing starts that was told as not sent, and a HOLD that is pressed last holds", async (test) => {
     // From this seed on all ends occur soon.
-    const first = Number(process.env.WEEDER_SEED ?? 13);
+    const first = Number(process.env.WEEDER_SEED ?? 1);
     test.diagnostic(`WEEDER_SEED=${first}`);
     const ends: string[] = [];
     for (let seed = first; seed < first + RUNS; seed++) ends.push(...(await pressInAnyOrder(seed)));

@@ -255,6 +255,16 @@ test("the wheel is calibrated over a measured stretch", async (test) => {
     await close({ page, errors });
 });
 
+test("a machine that stood still for seconds is there again over the same port, and takes commands", async (test) => {
+    const { page, errors, uno } = await atHold(test, PHONE, "--stand");
+    uno.pause(true);
+    await part(page, "state").filter({ hasText: "no machine" }).waitFor();
+    uno.pause(false);
+    await part(page, "state").filter({ hasText: "hold" }).waitFor();
+    await type(page, "get k");
+    await close({ page, errors });
+});
+
 test("the servo is calibrated by eye, and timed, while the machine stands", async (test) => {
     const { page, errors, uno } = await atHold(test, PHONE, "--stand");
     await page.getByRole("tab", { name: "Calibrate" }).click();

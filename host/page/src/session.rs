@@ -94,7 +94,8 @@ impl From<Clocks> for Moment {
 fn answer(session: &mut Session, turn: Turn) -> Value {
     let send: String = turn.to_send.into_iter().map(char::from).collect();
     let news: Vec<Value> = turn.happened.iter().map(Happening::news).collect();
-    json!({ "news": news, "send": send, "failure": session.take_failure().map(|error| failure(&error)) })
+    let failure = session.take_failure().map(|error| failure(&error));
+    json!({ "news": news, "isGivenUp": turn.is_given_up, "send": send, "failure": failure })
 }
 
 /// Why no weeder answers, in the form of `Failure` in `page/src/link/session.ts`.
@@ -121,7 +122,7 @@ mod tests {
         let number = usize::try_from(open(false).as_u64().unwrap()).unwrap();
         let request = |what| take(number, what);
         let heard = request(What::Listen { received: "\u{ff}\u{100}\r\n".to_owned() }).unwrap();
-        assert_eq!(heard, json!({ "news": [], "send": "", "failure": null }));
+        assert_eq!(heard, json!({ "news": [], "isGivenUp": false, "send": "", "failure": null }));
         let turn = request(What::Turn { now: Clocks { ticking_ms: 0.0, calendar_ms: 0.0 } }).unwrap();
         assert!(turn["send"].as_str().unwrap().ends_with("\u{8}\n") && turn["failure"].is_null(), "{turn}");
         let deadline = Clocks { ticking_ms: 9.0, calendar_ms: 9.0 };

@@ -54,11 +54,14 @@ async function whyNotOpened(error: unknown): Promise<PortError> {
     return new PortError(english("portTaken", { or: english(isLinux ? "noPermission" : "driverHangs") }));
 }
 
+/** Errors of a lost line are known by its reads. */
+const ignore = () => {};
+
 export class SerialLine {
     onBytes: (bytes: Uint8Array) => void = () => {};
     /** The line is gone, and why; never called after `close`. */
     onEnd: (why: PortError) => void = () => {};
-    readonly #writer: WritableStreamDefaultWriter<Uint8Array>;
+    #writer: Promise<WritableStreamDefaultWriter<Uint8Array>>;
     readonly #listening: Promise<void>;
     #reader: ReadableStreamDefaultReader<Uint8Array> | undefined;
     #isClosing = false;
@@ -81,18 +84,32 @@ export class SerialLine {
             this.#unlock = done;
         });
         void navigator.locks?.request(LOCK, { mode: "shared" }, () => isOver).catch(() => {});
-        this.#writer = port.writable.getWriter();
+        this.#writer = Promise.resolve(port.writable.getWriter());
         this.#listening = this.#listen();
     }
 
-    /** Writes bytes, after earlier ones. Throws a PortError if the line is gone. */
+    /** Writes bytes, after earlier ones. Throws a PortError if the line is gone, or the bytes were discarded. */
     async write(bytes: Uint8Array): Promise<void> {
+        const writer = this.#writer;
         try {
-            await this.#writer.write(bytes);
+            await (await writer).write(bytes);
         } catch {
-            this.#lose();
+            if (writer === this.#writer) this.#lose();
             throw new PortError(english("portGone"));
         }
+    }
+
+    /** Discards the bytes that have not left this computer yet, as a stalled port keeps them. Later ones come behind that. */
+    discard(): void {
+        this.#writer = this.#writer.then(async (writer) => {
+            await writer.abort().catch(ignore);
+            writer.releaseLock();
+            // The port has another stream then. A lost port has none.
+            if (!this.port.writable) throw new PortError(english("portGone"));
+            return this.port.writable.getWriter();
+        });
+        // The next byte reports it.
+        this.#writer.catch(ignore);
     }
 
     /** Resets the board, as opening its port does: its bootloader runs then. */
@@ -114,11 +131,9 @@ export class SerialLine {
 
     async #close(): Promise<void> {
         this.#isClosing = true;
-        // Errors of a lost line are already known here.
-        const ignore = () => {};
         await this.#reader?.cancel().catch(ignore);
         await this.#listening;
-        this.#writer.releaseLock();
+        await this.#writer.then((writer) => writer.releaseLock(), ignore);
         await this.port.close().catch(ignore);
         this.#unlock();
     }
@@ -155,7 +170,8 @@ export function sessionOver(line: SerialLine, now: number): Session {
     const encoder = new TextEncoder();
     // A lost line has reported its error.
     const send = (text: string) => void line.write(encoder.encode(text)).catch(() => {});
-    const session = new Session({ send, close: () => line.close() }, now, true, Date.now);
+    const wire = { send, discard: () => line.discard(), close: () => line.close() };
+    const session = new Session(wire, now, true, Date.now);
     // A byte is one character: the input may be noise, which is no valid UTF-8.
     line.onBytes = (bytes) => session.receive(String.fromCharCode(...bytes));
     line.onEnd = ({ message }) => session.end(message);

@@ -14,6 +14,8 @@ export type Ask = (command: string) => Promise<string[]>;
 /** A serial line to a machine. Its owner passes what it receives to the session. */
 export interface Wire {
     send(text: string): void;
+    /** Discards what has not left this computer yet: the machine must not get a command after its sender has given it up. */
+    discard?(): void;
     close(): Promise<void>;
 }
 
@@ -129,6 +131,8 @@ interface Turn {
         | { is: "answered"; number: number; refusal: string | null }
         | { is: "unanswered"; number: number; why: "late" | "held" | "notTyped" | "unknown"; because: string | null }
     )[];
+    /** Whether what was typed before is given up. */
+    readonly isGivenUp: boolean;
     readonly send: string;
     /** Why no weeder answers, and what the reason is about. */
     readonly failure: {
@@ -216,9 +220,10 @@ export class Session implements Link {
     #go(what: unknown): void {
         if (this.#ended || this.#isTurning) return;
         this.#isTurning = true;
-        const { news, send, failure } = this.#request<Turn>(what);
+        const { news, isGivenUp, send, failure } = this.#request<Turn>(what);
         const why = failure && whyNone(failure);
         try {
+            if (isGivenUp) this.wire.discard?.();
             if (send !== "") this.wire.send(send);
             for (const one of news) this.#take(one, why);
         } finally {
