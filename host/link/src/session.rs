@@ -41,6 +41,9 @@ use control::alarm::Warning;
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
 
+/// Time between two polls of the status.
+const POLL: Duration = Duration::from_millis(100);
+
 /// Longest wait for an answer.
 const PATIENCE: Duration = Duration::from_secs(3);
 

@@ -11,8 +11,10 @@ use std::sync::mpsc::RecvTimeoutError;
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Time limit for the servo's six swings out and in, and for waiting for plants.
+/// Time limit for the servo's six swings out and in, which take 20 s: a simulated machine on a busy computer is slower.
 const SWINGS: Duration = Duration::from_secs(60);
+
+/// Time limit for plants to pass.
 const PLANTS: Duration = Duration::from_secs(600);
 
 /// Time between two checks whether the machine stands, and the ticks after which it has left a mark.

@@ -2,8 +2,7 @@
 //! asked from the beginning.
 
 use super::happening::named_warning;
-use super::typing::POLL;
-use super::{Asked, EVENTS, EXAMPLES, HOLD, Happening, SETTINGS, STATUS, Session, State, VERSION};
+use super::{Asked, EVENTS, EXAMPLES, HOLD, Happening, POLL, SETTINGS, STATUS, Session, State, VERSION};
 use crate::settings::{self, Shown};
 use crate::{COMMAND_LENGTH, ConsoleLine, EventLine, LinkError, Status, lines};
 

@@ -6,12 +6,9 @@
 //! `set` that is read back, then the caller's commands, then the session's own questions.
 
 use super::introduction::INTRODUCTION;
-use super::{Asked, HOLD, Happening, STATUS, Session, State, Waiting};
+use super::{Asked, HOLD, Happening, POLL, STATUS, Session, State, Waiting};
 use std::mem;
 use std::time::Duration;
-
-/// Time between two polls of the status.
-pub(super) const POLL: Duration = Duration::from_millis(100);
 
 /// Longest further wait of a poll for commands: between many of them the state must not become unknown.
 const BEHIND: Duration = Duration::from_millis(300);
